@@ -1,0 +1,1 @@
+"""Step-response metrics of the pressure loop."""

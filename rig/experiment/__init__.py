@@ -1,0 +1,1 @@
+"""Protocols that run on any bench: deformation, blocked force, abort and resume."""

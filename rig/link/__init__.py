@@ -1,0 +1,1 @@
+"""CAN frames between host and board: one schema, end-to-end protection, acknowledged commands."""

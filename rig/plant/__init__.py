@@ -1,0 +1,1 @@
+"""The virtual bench: pneumatics, specimen, sensors and camera scene in simulated time."""

@@ -1,0 +1,1 @@
+"""Run folders: MCAP writing, reading, recovery and tables."""

@@ -1,0 +1,100 @@
+"""What a run says about itself: start, points and stop, after the manner of Bluesky.
+
+Times are bench times in seconds since the run began; units are those that labs speak.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict
+
+ExperimentName = Literal["deformation", "blocked_force"]
+Direction = Literal["up", "down"]
+ExitStatus = Literal["success", "aborted", "failed"]
+
+
+class Document(BaseModel):
+    """A frozen record that survives a round trip through JSON."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class StartDocument(Document):
+    """What the run set out to do; the specs themselves are attachments."""
+
+    actuator: str
+    bench: str
+    board: str
+    protocol: str
+    material: str
+    seed: int
+    created: str | None
+    """ISO date and time on a real bench; None in simulated time, where it would mean nothing."""
+    versions: dict[str, str]
+    """rig, firmware, protocol, python, and the libraries the numbers depend on."""
+    parameters: dict[str, float]
+    """Parameters in force on the board, read back; names carry their units."""
+
+
+class PointKey(Document):
+    """Which point of which sweep."""
+
+    experiment: ExperimentName
+    repeat: int
+    """1 for the first sweep."""
+    direction: Direction
+    target_kpa: float
+
+
+class PointDocument(Document):
+    """One measured point: when, at what pressure, and what came out."""
+
+    key: PointKey
+    started_s: float
+    """Set-point sent."""
+    settled_s: float | None
+    """First time from which the pressure stayed within tolerance for the window."""
+    measured_from_s: float
+    measured_to_s: float
+    pressure_kpa: float
+    """Mean of the measured pressure between measured_from_s and measured_to_s."""
+    pressure_sd_kpa: float
+    value: float | None
+    """Angle in degrees (deformation) or force in grams (blocked force); None if all rejected."""
+    value_sd: float
+    """Standard deviation of single readings."""
+    value_u: float
+    """Combined standard uncertainty of `value`: readings and calibration."""
+    unit: Literal["deg", "g"]
+    readings: int
+    """Accepted readings behind `value`."""
+    rejected: tuple[str, ...]
+    """A reason for each reading not used."""
+
+
+class AngleReading(Document):
+    """Vision result of one camera frame of a point."""
+
+    key: PointKey
+    frame: int
+    angle_deg: float | None
+    u_deg: float
+    quality: float
+    accepted: bool
+    reason: str
+
+
+class ResumeDocument(Document):
+    """A killed or aborted run was taken up again."""
+
+    resumed_s: float
+    points_kept: int
+    seed: int
+
+
+class StopDocument(Document):
+    """How the run ended."""
+
+    exit_status: ExitStatus
+    reason: str

@@ -1,0 +1,1 @@
+"""Validated descriptions of actuators, materials, benches, protocols and calibrations; SI inside."""

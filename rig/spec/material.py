@@ -1,0 +1,60 @@
+"""Material specs: every number carries its source."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from rig.spec.base import SpecModel
+from rig.spec.quantity import Density, Modulus, Ratio, Strength
+
+
+class SourcedModulus(SpecModel):
+    """A modulus in pascals and where it comes from."""
+
+    value: Modulus = Field(gt=0)
+    source: str = Field(min_length=3)
+
+
+class SourcedDensity(SpecModel):
+    """A density in kg/m3 and where it comes from."""
+
+    value: Density = Field(gt=0)
+    source: str = Field(min_length=3)
+
+
+class SourcedRatio(SpecModel):
+    """A dimensionless number and where it comes from."""
+
+    value: Ratio
+    source: str = Field(min_length=3)
+
+
+class StrengthRange(SpecModel):
+    """Tensile strength from `low` to `high` in pascals."""
+
+    low: Strength = Field(gt=0)
+    high: Strength = Field(gt=0)
+    source: str = Field(min_length=3)
+
+
+class RatioRange(SpecModel):
+    """A dimensionless range; elongation 2.2 means 220 %."""
+
+    low: Ratio = Field(gt=0)
+    high: Ratio = Field(gt=0)
+    source: str = Field(min_length=3)
+
+
+class MaterialSpec(SpecModel):
+    """An elastomer as the models need it."""
+
+    kind: Literal["material"]
+    name: str = Field(min_length=1)
+    description: str = ""
+    young_modulus: SourcedModulus
+    poisson_ratio: SourcedRatio
+    density: SourcedDensity
+    tensile_strength: StrengthRange | None = None
+    elongation_at_break: RatioRange | None = None

@@ -1,0 +1,1 @@
+"""Metrics, uncertainty and the comparison of models with experiments."""

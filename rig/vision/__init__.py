@@ -1,0 +1,1 @@
+"""Bending angle from images of the side view, with uncertainty; untrusted frames are rejected."""
