@@ -1,0 +1,128 @@
+"""The virtual camera: a rendered scene, sensor noise, JPEG, and the ways in which cameras fail."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.plant.layout import ProfileFunction, lay_out
+from rig.plant.optics import draw_projection
+from rig.plant.scene import Image, Light, Scene
+from rig.spec.actuator import Geometry
+from rig.spec.bench import VirtualOptics
+from rig.spec.calibration import CameraCalibration, RulerCalibration
+
+_NOISE_MARGIN = 96
+_BLACK_LEVEL = 3
+
+
+class CameraFault(Enum):
+    """What a script can do to the camera."""
+
+    NONE = "none"
+    FROZEN = "frozen"
+    """It delivers the last picture again and again."""
+    OCCLUDED_CAP = "occluded-cap"
+    """Something grey hides the end cap."""
+    DARK = "dark"
+    """The light is off."""
+
+
+class SensorNoise:
+    """Independent normal noise of standard deviation `sd` grey levels, rounded to whole levels.
+
+    One field larger than the picture is drawn beforehand; every frame reads it from an offset and
+    mirrored as drawn from the seed and the frame's time. Noise is therefore the same whenever
+    the same moment is rendered, and two frames share a pattern once in some 37,000 pairs.
+    """
+
+    def __init__(self, width: int, height: int, sd: float, rng: np.random.Generator) -> None:
+        self._width, self._height = width, height
+        self._key = int(rng.integers(2**32))
+        shape = (height + _NOISE_MARGIN, width + _NOISE_MARGIN, 3)
+        field = np.rint(rng.standard_normal(shape, np.float32) * np.float32(sd))
+        brighter = np.clip(field, 0, 255).astype(np.uint8)
+        darker = np.clip(-field, 0, 255).astype(np.uint8)
+        self._fields = [(brighter, darker), (darker, brighter)]
+        self._silent = sd == 0
+
+    def added(self, picture: Image, time_s: float) -> Image:
+        """`picture` with the noise of the moment `time_s`; saturates at black and white."""
+        if self._silent:
+            return picture
+        rng = np.random.default_rng((self._key, round(time_s * 1e6) % 2**64))
+        top, left = rng.integers(_NOISE_MARGIN + 1, size=2)
+        brighter, darker = self._fields[int(rng.integers(2))]
+        window = (slice(top, top + self._height), slice(left, left + self._width))
+        noisy = cv2.add(picture, brighter[window])
+        return np.asarray(cv2.subtract(noisy, darker[window], dst=noisy))
+
+
+class VirtualCamera:
+    """A USB camera in front of the virtual bench.
+
+    `rng` draws how crooked the camera stands, the direction of the light, the background and the
+    noise; the same generator state gives the same camera, and the same angle and time the same
+    picture, however many were taken before. `profile` gives the actuator's outlines.
+    `fault` may be set at any time. Raises SceneError if actuator and ruler do not fit into the
+    picture.
+    """
+
+    def __init__(
+        self,
+        calibration: CameraCalibration,
+        optics: VirtualOptics,
+        ruler: RulerCalibration,
+        geometry: Geometry,
+        jpeg_quality: int,
+        rng: np.random.Generator,
+        profile: ProfileFunction,
+    ) -> None:
+        pose, light, cloth, noise = rng.spawn(4)
+        self.projection = draw_projection(calibration, optics, pose)
+        self.layout = lay_out(geometry, ruler, self.projection, profile)
+        self.fault = CameraFault.NONE
+        self._geometry = geometry
+        self._profile = profile
+        self._scene = Scene(
+            self.projection,
+            self.layout,
+            ruler,
+            profile(geometry, 0.0).connector,
+            Light(optics.light_gradient, float(light.uniform(0, 2 * np.pi))),
+            optics.blur,
+            cloth,
+        )
+        self._noise = SensorNoise(calibration.width, calibration.height, optics.noise, noise)
+        # 4:2:2, as USB cameras send it; OpenCV would halve the colour in both directions.
+        self._encoding = [
+            cv2.IMWRITE_JPEG_QUALITY,
+            jpeg_quality,
+            cv2.IMWRITE_JPEG_SAMPLING_FACTOR,
+            cv2.IMWRITE_JPEG_SAMPLING_FACTOR_422,
+        ]
+        self._last: bytes | None = None
+
+    def render(self, angle: float, time_s: float) -> NDArray[np.uint8]:
+        """The picture (height, width, 3), BGR, at the bending `angle` in rad, before JPEG."""
+        if self.fault is CameraFault.DARK:
+            shape = (self.projection.height, self.projection.width, 3)
+            return self._noise.added(np.full(shape, _BLACK_LEVEL, np.uint8), time_s)
+        picture = self._scene.picture(
+            self._profile(self._geometry, angle), self.fault is CameraFault.OCCLUDED_CAP
+        )
+        return self._noise.added(picture, time_s)
+
+    def grab(self, angle: float, time_s: float) -> bytes:
+        """A JPEG as the camera delivers it, of the bending `angle` (rad) at `time_s` (s).
+
+        A frozen camera repeats its last picture; if there is none, it takes this one first.
+        """
+        if self.fault is CameraFault.FROZEN and self._last is not None:
+            return self._last
+        _, encoded = cv2.imencode(".jpg", self.render(angle, time_s), self._encoding)
+        self._last = encoded.tobytes()
+        return self._last
