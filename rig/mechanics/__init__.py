@@ -1,1 +1,1 @@
-"""Geometry families, beam theory and reduced responses: pressure in, angle, force and volume out."""
+"""Geometry families, beam theory, reduced responses: pressure in; angle, force, volume out."""
