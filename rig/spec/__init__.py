@@ -1,1 +1,1 @@
-"""Validated descriptions of actuators, materials, benches, protocols and calibrations; SI inside."""
+"""Validated descriptions of actuators, materials, benches, protocols, calibrations; SI inside."""

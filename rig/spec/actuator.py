@@ -8,10 +8,9 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field, PositiveInt, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import Field, model_validator
 
-from rig.spec.base import SpecModel
+from rig.spec.base import Count, SpecModel, require
 from rig.spec.quantity import Length, Pressure, Ratio
 
 ModelName = Literal["beam"]
@@ -25,7 +24,7 @@ class BellowBendingGeometry(SpecModel):
 
     family: Literal["bellow-bending"]
     effective_length: Length = Field(0.066, gt=0, description="L, length of all convolutions")
-    bellow_number: PositiveInt = Field(6, description="N, convolutions from trough to trough")
+    bellow_number: Count = Field(6, description="N, convolutions from trough to trough")
     average_radius: Length = Field(0.006, gt=0, description="rm = (ri + ro) / 2")
     radius_ratio: Ratio = Field(1 / 3, gt=0, lt=1, description="lambda = ri / rm")
     wall_thickness: Length = Field(0.0015, gt=0, description="t, bellow wall")
@@ -54,8 +53,7 @@ class BellowBendingGeometry(SpecModel):
                 f"least L/(4N) = {arc_mm:.3g} mm (eq. 1); increase average_radius or "
                 f"bellow_number, or reduce radius_ratio or effective_length"
             )
-        if problems:
-            raise PydanticCustomError("geometry", "{why}", {"why": "; ".join(problems)})
+        require(not problems, "; ".join(problems))
         return self
 
 

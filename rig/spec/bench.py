@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, PositiveInt
+from pydantic import Field, model_validator
 
-from rig.spec.base import SpecModel
+from rig.spec.base import Count, Integer, Number, SpecModel, require
 from rig.spec.quantity import (
     Acceleration,
     Angle,
@@ -40,32 +40,42 @@ class SerialBoard(SpecModel):
 
     kind: Literal["serial"]
     port: str = Field(description="as /dev/ttyACM0, COM3 or socket://host:port")
-    baudrate: PositiveInt = 115200
+    baudrate: Count = 115200
 
 
 class Syringe(SpecModel):
+    """The syringe whose plunger sets the pressure."""
+
     volume: Volume = Field(gt=0)
     inner_diameter: Length = Field(gt=0)
     dead_volume: Volume = Field(ge=0, description="left when the plunger is fully in")
 
 
 class Stepper(SpecModel):
-    steps_per_revolution: PositiveInt
-    microsteps: PositiveInt
+    """The motor that turns the lead screw, and how finely it is driven."""
+
+    steps_per_revolution: Count
+    microsteps: Count
     max_step_rate: Frequency = Field(gt=0)
 
 
 class LeadScrew(SpecModel):
+    """What turns revolutions of the motor into travel of the plunger."""
+
     lead: Length = Field(gt=0, description="travel per revolution")
     backlash: Length = Field(ge=0)
 
 
 class Tubing(SpecModel):
+    """The tube between syringe and actuator."""
+
     inner_diameter: Length = Field(gt=0)
     length: Length = Field(gt=0)
 
 
 class Transducer(SpecModel):
+    """The pressure sensor as its data sheet describes it."""
+
     model: str
     pressure_low: Pressure
     pressure_high: Pressure
@@ -73,13 +83,25 @@ class Transducer(SpecModel):
     voltage_high: Voltage
     calibration: str = Field(description="file in calibration/, or a path")
 
+    @model_validator(mode="after")
+    def _rising(self) -> Transducer:
+        require(
+            self.pressure_low < self.pressure_high and self.voltage_low < self.voltage_high,
+            "expected pressure_low below pressure_high and voltage_low below voltage_high",
+        )
+        return self
+
 
 class Adc(SpecModel):
-    bits: PositiveInt
+    """The converter that reads the transducer."""
+
+    bits: Count = Field(le=32)
     reference: Voltage = Field(gt=0)
 
 
 class LoadCell(SpecModel):
+    """The load cell with its amplifier (HX711)."""
+
     model: str
     capacity: Mass = Field(gt=0)
     sample_rate: Frequency = Field(gt=0)
@@ -96,12 +118,14 @@ class OpenCvCameraDevice(SpecModel):
     """A camera, video file or stream that OpenCV opens."""
 
     kind: Literal["opencv"]
-    source: int | str
+    source: Integer | str
 
 
 class Camera(SpecModel):
+    """The camera beside the actuator, and the ruler in its picture."""
+
     device: Annotated[VirtualCameraDevice | OpenCvCameraDevice, Field(discriminator="kind")]
-    jpeg_quality: int = Field(92, ge=50, le=100)
+    jpeg_quality: Integer = Field(92, ge=50, le=100)
     frame_rate: Frequency = Field(gt=0)
     calibration: str = Field(description="file in calibration/, or a path")
     ruler: str = Field(description="ruler calibration file in calibration/, or a path")
@@ -127,6 +151,8 @@ class Safety(SpecModel):
 
 
 class Ambient(SpecModel):
+    """The air around the bench."""
+
     pressure: Pressure = Field(gt=0)
     temperature: Temperature = Field(gt=0)
 
@@ -146,11 +172,15 @@ class SpecimenVariation(SpecModel):
 
 
 class VirtualPneumatics(SpecModel):
+    """How simulated air differs from an ideal isothermal gas in a tight system."""
+
     heat_exchange_time: Duration = Field(gt=0, description="gas to wall, time constant")
     leak: Flow = Field(ge=0, description="at 10 kPa gauge, ambient conditions")
 
 
 class VirtualSensors(SpecModel):
+    """Noise and drift of the simulated sensors."""
+
     transducer_noise: Voltage = Field(ge=0, description="standard deviation of one conversion")
     transducer_offset: Pressure = Field(ge=0, description="standard deviation before zeroing")
     load_cell_noise: Mass = Field(ge=0)
@@ -160,14 +190,18 @@ class VirtualSensors(SpecModel):
 
 
 class VirtualOptics(SpecModel):
+    """Where the simulated camera stands, and what spoils its picture."""
+
     distance: Length = Field(gt=0, description="camera to the plane of bending")
     tilt: Angle = Field(ge=0, description="standard deviation of pan, tilt and roll")
-    blur: float = Field(ge=0, description="standard deviation of the point spread, pixels")
-    noise: float = Field(ge=0, description="standard deviation, grey levels of 255")
+    blur: Number = Field(ge=0, description="standard deviation of the point spread, pixels")
+    noise: Number = Field(ge=0, description="standard deviation, grey levels of 255")
     light_gradient: Ratio = Field(ge=0, description="brightness change across the picture")
 
 
 class VirtualBench(SpecModel):
+    """All that a simulated bench hides from the experiment."""
+
     specimen: SpecimenVariation
     pneumatics: VirtualPneumatics
     sensors: VirtualSensors
@@ -175,6 +209,8 @@ class VirtualBench(SpecModel):
 
 
 class BenchSpec(SpecModel):
+    """One bench: hardware, controller gains, safety limits, and for a virtual one its secrets."""
+
     kind: Literal["bench"]
     name: str = Field(min_length=1)
     description: str = ""
@@ -191,3 +227,28 @@ class BenchSpec(SpecModel):
     safety: Safety
     ambient: Ambient
     virtual: VirtualBench | None = None
+
+    @model_validator(mode="after")
+    def _parts_fit_together(self) -> BenchSpec:
+        is_virtual = isinstance(self.board, VirtualBoard)
+        problems = []
+        if self.safety.pressure > self.transducer.pressure_high:
+            problems.append(
+                f"safety.pressure is {self.safety.pressure / 1e3:g} kPa, beyond what the "
+                f"transducer can see; expected at most transducer.pressure_high, "
+                f"{self.transducer.pressure_high / 1e3:g} kPa"
+            )
+        if self.transducer.voltage_high > self.adc.reference:
+            problems.append(
+                f"transducer.voltage_high is {self.transducer.voltage_high:g} V, beyond what the "
+                f"converter can see; expected at most adc.reference, {self.adc.reference:g} V"
+            )
+        if is_virtual and self.virtual is None:
+            problems.append("a virtual board needs the section 'virtual'; see models/benches")
+        if is_virtual != isinstance(self.camera.device, VirtualCameraDevice):
+            problems.append(
+                f"board.kind is '{self.board.kind}' but camera.device.kind is "
+                f"'{self.camera.device.kind}'; expected both virtual or both real"
+            )
+        require(not problems, "; ".join(problems))
+        return self

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from datetime import date
 from typing import Literal
 
 from pydantic import Field
 
-from rig.spec.base import SpecModel
+from rig.spec.base import Count, Date, Integer, Number, SpecModel
 from rig.spec.quantity import Length, Mass, Pressure, Ratio, TransducerGain, Voltage
 
 
 class Provenance(SpecModel):
     """Who calibrated what, when and how."""
 
-    date: date
+    date: Date
     method: str
     instrument: str
     operator: str = ""
@@ -38,7 +37,7 @@ class LoadCellCalibration(SpecModel):
 
     kind: Literal["calibration"]
     instrument: Literal["load-cell"]
-    counts_per_gram: float = Field(gt=0)
+    counts_per_gram: Number = Field(gt=0)
     counts_per_gram_u: Ratio = Field(ge=0, description="relative standard uncertainty")
     creep_u: Mass = Field(ge=0, description="standard uncertainty from creep and drift")
     provenance: Provenance
@@ -49,14 +48,14 @@ class CameraCalibration(SpecModel):
 
     kind: Literal["calibration"]
     instrument: Literal["camera"]
-    width: int = Field(gt=0)
-    height: int = Field(gt=0)
-    focal_x: float = Field(gt=0)
-    focal_y: float = Field(gt=0)
-    centre_x: float
-    centre_y: float
-    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
-    angle_u_deg: float = Field(ge=0, description="standard uncertainty of in-plane angles, deg")
+    width: Count
+    height: Count
+    focal_x: Number = Field(gt=0)
+    focal_y: Number = Field(gt=0)
+    centre_x: Number
+    centre_y: Number
+    distortion: tuple[Number, Number, Number, Number, Number] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    angle_u_deg: Number = Field(ge=0, description="standard uncertainty of in-plane angles, deg")
     provenance: Provenance
 
 
@@ -69,7 +68,7 @@ class RulerCalibration(SpecModel):
     kind: Literal["calibration"]
     instrument: Literal["ruler"]
     pitch: Length = Field(gt=0, description="distance between neighbouring marks")
-    marks: int = Field(ge=3, description="marks on each leg, the corner mark not counted")
+    marks: Integer = Field(ge=3, description="marks on each leg, the corner mark not counted")
     pitch_u: Length = Field(ge=0, description="standard uncertainty of the pitch")
-    squareness_u_deg: float = Field(ge=0, description="standard uncertainty of the right angle")
+    squareness_u_deg: Number = Field(ge=0, description="standard uncertainty of the right angle")
     provenance: Provenance

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from rig.spec.base import SpecModel
+from rig.spec.base import SpecModel, require
 from rig.spec.quantity import Density, Modulus, Ratio, Strength
 
 
@@ -24,10 +24,10 @@ class SourcedDensity(SpecModel):
     source: str = Field(min_length=3)
 
 
-class SourcedRatio(SpecModel):
-    """A dimensionless number and where it comes from."""
+class SourcedPoissonRatio(SpecModel):
+    """A Poisson's ratio and where it comes from; 0.5 would be incompressible."""
 
-    value: Ratio
+    value: Ratio = Field(gt=-1, lt=0.5)
     source: str = Field(min_length=3)
 
 
@@ -38,6 +38,11 @@ class StrengthRange(SpecModel):
     high: Strength = Field(gt=0)
     source: str = Field(min_length=3)
 
+    @model_validator(mode="after")
+    def _ordered(self) -> StrengthRange:
+        require(self.low <= self.high, "expected 'low' at most 'high'")
+        return self
+
 
 class RatioRange(SpecModel):
     """A dimensionless range; elongation 2.2 means 220 %."""
@@ -45,6 +50,11 @@ class RatioRange(SpecModel):
     low: Ratio = Field(gt=0)
     high: Ratio = Field(gt=0)
     source: str = Field(min_length=3)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> RatioRange:
+        require(self.low <= self.high, "expected 'low' at most 'high'")
+        return self
 
 
 class MaterialSpec(SpecModel):
@@ -54,7 +64,7 @@ class MaterialSpec(SpecModel):
     name: str = Field(min_length=1)
     description: str = ""
     young_modulus: SourcedModulus
-    poisson_ratio: SourcedRatio
+    poisson_ratio: SourcedPoissonRatio
     density: SourcedDensity
     tensile_strength: StrengthRange | None = None
     elongation_at_break: RatioRange | None = None

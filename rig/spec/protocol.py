@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field, PositiveInt, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import Field, model_validator
 
-from rig.spec.base import SpecModel
+from rig.spec.base import Count, Integer, SpecModel, require
 from rig.spec.quantity import Duration, Pressure
+
+MAX_STEPS = 1000
 
 
 class PressureSteps(SpecModel):
@@ -21,12 +22,10 @@ class PressureSteps(SpecModel):
     @model_validator(mode="after")
     def _whole_steps(self) -> PressureSteps:
         count = (self.stop - self.start) / self.step
-        if count < 1 or abs(count - round(count)) > 1e-6:
-            raise PydanticCustomError(
-                "steps",
-                "start to stop is {count} steps; it must be a whole number of at least one",
-                {"count": f"{count:.4g}"},
-            )
+        require(
+            1 <= round(count) <= MAX_STEPS and abs(count - round(count)) <= 1e-6,
+            f"start to stop is {count:.4g} steps; expected a whole number from 1 to {MAX_STEPS}",
+        )
         return self
 
     def values(self) -> tuple[float, ...]:
@@ -47,32 +46,34 @@ class SweepProtocol(SpecModel):
     """What both experiments share: visit each pressure, settle, hold, measure, repeat."""
 
     pressures: PressureSteps = PressureSteps()
-    repeats: PositiveInt = Field(5, description="ascending sweeps, each from the vented state")
-    descending_repeats: int = Field(
+    repeats: Count = Field(5, le=1000, description="ascending sweeps, each from the vented state")
+    descending_repeats: Integer = Field(
         0, ge=0, description="how many of the last repeats also come down again (hysteresis)"
     )
     settling: Settling = Settling()
     hold: Duration = Field(30.0, ge=0, description="wait after settling, against creep")
+    rest: Duration = Field(10.0, ge=0, description="vented rest before each repeat (our choice)")
 
     @model_validator(mode="after")
     def _descending_within_repeats(self) -> SweepProtocol:
-        if self.descending_repeats > self.repeats:
-            raise PydanticCustomError(
-                "repeats", "descending_repeats cannot exceed repeats", {}
-            )
+        require(
+            self.descending_repeats <= self.repeats,
+            f"descending_repeats is {self.descending_repeats}; expected at most the "
+            f"{self.repeats} of repeats",
+        )
         return self
 
 
 class DeformationProtocol(SweepProtocol):
     """Bending angle by camera at each pressure."""
 
-    frames: PositiveInt = Field(5, description="camera frames averaged at each point")
+    frames: Count = Field(5, le=1000, description="camera frames averaged at each point")
 
 
 class BlockedForceProtocol(SweepProtocol):
     """Tip force on the load cell at each pressure."""
 
-    readings: PositiveInt = Field(200, description="HX711 readings averaged at each point")
+    readings: Count = Field(200, le=100_000, description="HX711 readings averaged at each point")
 
 
 class ProtocolSpec(SpecModel):
@@ -83,3 +84,11 @@ class ProtocolSpec(SpecModel):
     description: str = ""
     deformation: DeformationProtocol | None = None
     blocked_force: BlockedForceProtocol | None = None
+
+    @model_validator(mode="after")
+    def _at_least_one_experiment(self) -> ProtocolSpec:
+        require(
+            self.deformation is not None or self.blocked_force is not None,
+            "no experiment to run; expected 'deformation', 'blocked_force' or both",
+        )
+        return self
