@@ -43,6 +43,20 @@ def did_you_mean(given: str, known: Iterable[str]) -> str:
     return f"{guess or ';'} expected {one_of(names)}"
 
 
+def show(given: Any) -> str:
+    """A value from a file in quotes, kept short."""
+    if given is None:
+        return "nothing"
+    if isinstance(given, bool):
+        return str(given).lower()
+    if isinstance(given, dict):
+        return "a mapping"
+    if isinstance(given, list):
+        return "a list"
+    text = str(given)
+    return f"'{text if len(text) <= 40 else text[:37] + '...'}'"
+
+
 def one_of(names: Sequence[str]) -> str:
     """`'a'`, or `one of 'a', 'b'`."""
     quoted = ", ".join(f"'{name}'" for name in names)
@@ -80,7 +94,7 @@ def _wrong_tag(
         message = f"required, but missing; expected {one_of(expected)}"
     else:
         given = str(context["tag"])
-        message = f"{_show(given)} is not known{did_you_mean(given, expected)}"
+        message = f"{show(given)} is not known{did_you_mean(given, expected)}"
     place = tree.place_of_value(location)
     return Problem(tree.path, message, dotted(location), place.line, place.column)
 
@@ -88,30 +102,17 @@ def _wrong_tag(
 def _message(details: ErrorDetails, field: FieldInfo | None, location: Location, given: Any) -> str:
     kind = details["type"]
     if kind in _BOUNDS:
-        return f"{_show(given)} is out of range; expected {_expected(field, location)}"
+        return f"{show(given)} is out of range; expected {_expected(field, location)}"
     if kind == "literal_error":
         known = [str(name) for name in _choices(field)]
-        return f"{_show(given)} is not known{did_you_mean(str(given), known)}"
+        return f"{show(given)} is not known{did_you_mean(str(given), known)}"
     if kind in ("model_type", "model_attributes_type", "dict_type"):
-        return f"{_show(given)} is no mapping; expected 'key: value' lines"
+        return f"{show(given)} is no mapping; expected 'key: value' lines"
     if kind in ("tuple_type", "list_type"):
-        return f"{_show(given)} is no list; expected a list such as [a, b]"
+        return f"{show(given)} is no list; expected a list such as [a, b]"
     if kind in _OWN_WORDS:
         return details["msg"]
-    return f"{_show(given)} does not fit; expected {_expected(field, location)}"
-
-
-def _show(given: Any) -> str:
-    if given is None:
-        return "nothing"
-    if isinstance(given, bool):
-        return str(given).lower()
-    if isinstance(given, dict):
-        return "a mapping"
-    if isinstance(given, list):
-        return "a list"
-    text = str(given)
-    return f"'{text if len(text) <= 40 else text[:37] + '...'}'"
+    return f"{show(given)} does not fit; expected {_expected(field, location)}"
 
 
 def _expected(field: FieldInfo | None, location: Location) -> str:

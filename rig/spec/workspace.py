@@ -22,7 +22,7 @@ from rig.spec.calibration import (
 )
 from rig.spec.consistency import pressure_beyond_material
 from rig.spec.errors import Problem, SpecError
-from rig.spec.explain import did_you_mean
+from rig.spec.explain import did_you_mean, show
 from rig.spec.loading import AnyCalibration, Loaded, parse, parse_calibration, read, read_text
 from rig.spec.material import MaterialSpec
 from rig.spec.protocol import ProtocolSpec
@@ -140,20 +140,22 @@ class Workspace:
     """A folder with models/ and calibration/; runs are recorded in its logs/."""
 
     root: Path
+    is_library: bool = False
+    """Whether this is the library shipped with rig, for want of a workspace of one's own."""
 
     @classmethod
     def find(cls, start: Path | None = None) -> Workspace:
-        """The workspace around `start` (default: the current directory), else the shipped library."""
+        """The workspace around `start` (default: here), else the library shipped with rig."""
         here = (start or Path.cwd()).resolve()
         for folder in (here, *here.parents):
             if is_workspace(folder):
                 return cls(folder)
-        return cls(library_root())
+        return cls(library_root(), is_library=True)
 
     @property
     def logs(self) -> Path:
-        """Where runs are recorded; of the current directory if the workspace is the library."""
-        return (Path.cwd() if self.root == library_root() else self.root) / "logs"
+        """Where runs are recorded: in the current directory if there is no workspace around."""
+        return (Path.cwd() if self.is_library else self.root) / "logs"
 
     def names(self, kind: str) -> list[str]:
         """Names of the files of `kind` (see FOLDERS), sorted."""
@@ -180,9 +182,8 @@ class Workspace:
             names = self.names(kind)
             known = f", or a name from {folder}: {', '.join(names)}" if names else ""
             raise SpecError([Problem(given, message + known)])
-        message = (
-            f"'{reference}' is no {kind} there{did_you_mean(str(reference), self.names(kind))}"
-        )
+        name = str(reference)
+        message = f"{show(name)} is no {kind} there{did_you_mean(name, self.names(kind))}"
         raise SpecError([Problem(folder, message)])
 
     def actuator(self, reference: str | Path) -> ActuatorSpec:
@@ -248,13 +249,13 @@ class Workspace:
         problems = _Problems()
         sources: dict[str, Loaded[Any]] = {}
         with problems.collected():
-            source = read(self.path("actuator", actuator), ActuatorSpec)
-            sources["actuator"] = source
-            sources["material"] = self.resolve_actuator(source)
+            drawing = read(self.path("actuator", actuator), ActuatorSpec)
+            sources["actuator"] = drawing
+            sources["material"] = self.resolve_actuator(drawing)
         with problems.collected():
-            source = read(self.path("bench", bench), BenchSpec)
-            sources["bench"] = source
-            sources |= self.resolve_bench_file(source)
+            equipment = read(self.path("bench", bench), BenchSpec)
+            sources["bench"] = equipment
+            sources |= self.resolve_bench_file(equipment)
         with problems.collected():
             sources["protocol"] = read(self.path("protocol", protocol), ProtocolSpec)
         problems.raise_any()
