@@ -19,7 +19,7 @@ NOT_VERBS = {"app", "main"}
 
 def _register_verbs() -> None:
     for module in pkgutil.iter_modules(rig.cli.__path__):
-        if module.name not in NOT_VERBS:
+        if module.name not in NOT_VERBS and not module.name.startswith("_"):
             importlib.import_module(f"rig.cli.{module.name}")
 
 

@@ -1,0 +1,64 @@
+"""A bench in the lab: a Mega on a serial port, a camera, and a person who mounts the tip."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal
+
+from rig.board.camera import OpenCvCamera
+from rig.board.errors import BoardError
+from rig.link.bus import SlcanBus
+from rig.link.serial import SerialTransport
+from rig.spec.bench import BenchSpec, OpenCvCameraDevice, SerialBoard
+from rig.spec.calibration import CameraCalibration
+
+INSTRUCTIONS = {
+    "free": "Take the load cell away, so that the actuator hangs free",
+    "blocked": "Mount the load cell so that it just touches the bottom layer at the tip",
+}
+
+
+class RealBench:
+    """A bench, open; `ask` shows an instruction and returns when the person has followed it.
+
+    Bench time begins at `start_s`, which a resumed run sets to where it was.
+    """
+
+    def __init__(
+        self,
+        bench: BenchSpec,
+        camera: CameraCalibration,
+        ask: Callable[[str], None],
+        *,
+        start_s: float = 0.0,
+    ) -> None:
+        if not isinstance(bench.board, SerialBoard):
+            raise BoardError(f"the bench '{bench.name}' has no serial board")
+        if not isinstance(bench.camera.device, OpenCvCameraDevice):
+            raise BoardError(
+                f"the bench '{bench.name}' has a real board but a virtual camera; set "
+                "camera.device to kind 'opencv' with the number of the device."
+            )
+        transport = SerialTransport(bench.board.port, bench.board.baudrate, start_s=start_s)
+        self.bus = SlcanBus(transport)
+        try:
+            self.camera = OpenCvCamera(
+                bench.camera.device.source,
+                camera.width,
+                camera.height,
+                bench.camera.jpeg_quality,
+                lambda: transport.now_s,
+            )
+        except BoardError:
+            self.bus.close()
+            raise
+        self._ask = ask
+
+    def mount(self, fixture: Literal["free", "blocked"]) -> None:
+        """Ask the person at the bench to free or block the tip."""
+        self._ask(INSTRUCTIONS[fixture])
+
+    def close(self) -> None:
+        """Release port and camera."""
+        self.camera.close()
+        self.bus.close()

@@ -1,0 +1,90 @@
+"""The virtual bench's truth, in a file of its own that no experiment opens.
+
+One channel `/truth`: time, pressure, angle, force as they really were, ten times a second.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from mcap.writer import CompressionType, Writer
+
+from rig.plant.plant import GRAVITY, Truth
+
+SCHEMA = {
+    "type": "object",
+    "title": "truth",
+    "properties": {
+        "time_s": {"type": "number", "description": "bench time, s"},
+        "pressure_kpa": {"type": "number", "description": "gauge pressure in the syringe, kPa"},
+        "angle_deg": {"type": "number", "description": "bending angle, deg"},
+        "force_g": {"type": "number", "description": "tip force, gram-force"},
+        "volume_ml": {"type": "number", "description": "cavity volume, mL"},
+    },
+}
+
+
+class TruthFile:
+    """Writes truth samples to an MCAP file, from the moment its folder is there.
+
+    The folder is made by the run's own log, which must find it empty.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._stream: BinaryIO | None = None
+
+    def _begin(self) -> None:
+        self._stream = self._path.open("xb")
+        self._writer = Writer(self._stream, chunk_size=1 << 18, compression=CompressionType.ZSTD)
+        self._writer.start(profile="", library="rig truth")
+        schema = self._writer.register_schema(
+            "rig.Truth", "jsonschema", json.dumps(SCHEMA).encode()
+        )
+        self._channel = self._writer.register_channel("/truth", "json", schema)
+
+    def write(self, time_s: float, truth: Truth) -> None:
+        """Add a sample at bench time `time_s`."""
+        if self._stream is None:
+            if not self._path.parent.is_dir():
+                return
+            self._begin()
+        stamp = round(time_s * 1e9)
+        row = (
+            f'{{"time_s":{time_s:.3f},"pressure_kpa":{truth.gauge_pressure / 1e3:.6f},'
+            f'"angle_deg":{truth.angle * 57.29577951308232:.6f},'
+            f'"force_g":{truth.force / GRAVITY * 1e3:.6f},'
+            f'"volume_ml":{truth.actuator_volume * 1e6:.6f}}}'
+        )
+        self._writer.add_message(self._channel, stamp, row.encode(), stamp)
+
+    def close(self) -> None:
+        """Finish the file."""
+        if self._stream is not None:
+            self._writer.finish()
+            self._stream.close()
+
+
+@dataclass(frozen=True)
+class TruthSample:
+    """One row of a truth file."""
+
+    time_s: float
+    pressure_kpa: float
+    angle_deg: float
+    force_g: float
+    volume_ml: float
+
+
+def read_truth(path: Path) -> list[TruthSample]:
+    """All samples of a truth file, oldest first."""
+    from mcap.reader import make_reader
+
+    with path.open("rb") as stream:
+        return [
+            TruthSample(**json.loads(message.data))
+            for _, _, message in make_reader(stream).iter_messages(topics=["/truth"])
+        ]

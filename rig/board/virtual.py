@@ -1,0 +1,148 @@
+"""The virtual bench: native firmware, simulated plant and rendered camera, behind real interfaces.
+
+Experiments get a bus and a camera. The truth goes to a file of its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from rig.board.errors import BoardError
+from rig.board.native import NativeBoard
+from rig.board.revision import firmware_revision
+from rig.board.truth import TruthFile
+from rig.link.bus import SlcanBus
+from rig.mechanics.profile import side_profile
+from rig.plant.camera import VirtualCamera
+from rig.plant.plant import Fixture, HiddenErrors, Plant, plant_parameters
+from rig.plant.specimen import draw_specimen
+from rig.spec.bench import BenchSpec
+from rig.spec.bench import VirtualBench as VirtualBenchSpec
+from rig.spec.workspace import Setup
+
+
+@dataclass(frozen=True)
+class _Seeds:
+    """A stream for every part, so that a change in one leaves the others' draws alone."""
+
+    specimen: np.random.SeedSequence
+    instruments: np.random.SeedSequence
+    camera: np.random.SeedSequence
+    noise: np.random.SeedSequence
+
+    @classmethod
+    def of(cls, seed: int, segment: int) -> _Seeds:
+        specimen, instruments, camera, noise = np.random.SeedSequence(seed).spawn(4)
+        return cls(specimen, instruments, camera, noise.spawn(segment + 1)[-1])
+
+
+def _virtual(bench: BenchSpec) -> VirtualBenchSpec:
+    if bench.virtual is None:
+        raise BoardError(
+            f"the bench '{bench.name}' has a virtual board but no section 'virtual', which holds "
+            "the imperfections of the simulated bench; copy the one of "
+            "models/benches/virtual.yaml."
+        )
+    return bench.virtual
+
+
+def _plant(setup: Setup, seeds: _Seeds) -> Plant:
+    """The simulated bench with the specimen and the instrument errors that the seeds draw."""
+    bench, calibrations = setup.bench, setup.calibrations
+    specimen = draw_specimen(
+        setup.actuator,
+        setup.material,
+        _virtual(bench).specimen,
+        np.random.default_rng(seeds.specimen),
+    )
+    errors = HiddenErrors.draw(
+        bench,
+        calibrations.transducer,
+        calibrations.load_cell,
+        np.random.default_rng(seeds.instruments),
+    )
+    parameters = plant_parameters(
+        bench,
+        calibrations.transducer,
+        calibrations.load_cell,
+        specimen,
+        errors,
+        setup.actuator.limits.pressure,
+    )
+    return Plant(parameters, specimen, int(seeds.noise.generate_state(1, np.uint64)[0]))
+
+
+def virtual_board(setup: Setup, seed: int) -> NativeBoard:
+    """The native firmware on a simulated bench, without camera and truth file."""
+    plant = _plant(setup, _Seeds.of(seed, 0))
+    return NativeBoard(plant, firmware_git=firmware_revision())
+
+
+class PlantCamera:
+    """Looks at the plant's actuator, now."""
+
+    def __init__(self, camera: VirtualCamera, plant: Plant, board: NativeBoard) -> None:
+        self._camera = camera
+        self._plant = plant
+        self._board = board
+
+    def grab(self) -> tuple[float, bytes]:
+        """Bench time in seconds and the JPEG of a frame taken now."""
+        time_s = self._board.now_s
+        return time_s, self._camera.grab(self._plant.truth().angle, time_s)
+
+
+class VirtualBench:
+    """A bench, open.
+
+    `truth_path` is where the truth is written, if anywhere. `segment` is 0 for a new run; a
+    resumed run starts at `start_s` with the same specimen and instruments but fresh noise.
+    """
+
+    def __init__(
+        self,
+        setup: Setup,
+        seed: int,
+        truth_path: Path | None = None,
+        *,
+        segment: int = 0,
+        start_s: float = 0.0,
+    ) -> None:
+        seeds = _Seeds.of(seed, segment)
+        self.plant = _plant(setup, seeds)
+        self._truth = TruthFile(truth_path) if truth_path is not None else None
+        self._board = NativeBoard(
+            self.plant,
+            firmware_git=firmware_revision(),
+            start_s=start_s,
+            after_poll=self._write_truth,
+        )
+        self.bus = SlcanBus(self._board)
+        camera = VirtualCamera(
+            setup.calibrations.camera,
+            _virtual(setup.bench).optics,
+            setup.calibrations.ruler,
+            setup.actuator.geometry,
+            setup.bench.camera.jpeg_quality,
+            np.random.default_rng(seeds.camera),
+            side_profile,
+        )
+        self.camera = PlantCamera(camera, self.plant, self._board)
+
+    def mount(self, fixture: Literal["free", "blocked"]) -> None:
+        """Free the tip or block it against the load cell."""
+        self.plant.set_fixture(Fixture.FREE if fixture == "free" else Fixture.BLOCKED)
+
+    def _write_truth(self) -> None:
+        if self._truth is not None:
+            self._truth.write(self._board.now_s, self.plant.truth())
+
+    def close(self) -> None:
+        """Finish the truth file."""
+        self.bus.close()
+        if self._truth is not None:
+            self._truth.close()

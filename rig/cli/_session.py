@@ -1,0 +1,175 @@
+"""A characterisation from the command line: open the bench, take the run, write the report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from rig.board.real import RealBench
+from rig.board.virtual import VirtualBench
+from rig.cli._interruption import catching_signals
+from rig.cli._progress import LABELS, ProgressObserver
+from rig.cli._summary import show_summary
+from rig.experiment.bench import Bench, Observer
+from rig.experiment.errors import ExperimentError
+from rig.experiment.plan import make_plan
+from rig.experiment.run import RunOutcome, new_run, resume_run
+from rig.experiment.setup import RunRequest
+from rig.mechanics.profile import cavity_volume
+from rig.record.reader import RunReader
+from rig.spec.bench import VirtualBoard
+from rig.spec.workspace import Setup, Workspace
+
+
+@dataclass(frozen=True)
+class Session:
+    """One characterisation, ready to be shown or run."""
+
+    request: RunRequest
+    logs: Path
+    console: Console
+
+    def show_plan(self) -> None:
+        """Print what will be done, in which order, and how long it takes."""
+        setup, plan = self.request.setup, self.request.plan
+        self.console.print(
+            f"[bold]{setup.actuator.name}[/] ({setup.material.name}) on the bench "
+            f"[bold]{setup.bench.name}[/], protocol [bold]{setup.protocol.name}[/], "
+            f"seed {self.request.seed}"
+        )
+        table = Table("experiment", "sweeps", "points", "pressures (kPa)", "hold (s)")
+        for name, label in LABELS.items():
+            sweeps = [s for s in plan.sweeps if s.experiment == name]
+            if not sweeps:
+                continue
+            targets = sorted({key.target_kpa for sweep in sweeps for key in sweep.keys})
+            table.add_row(
+                label,
+                str(len(sweeps)),
+                str(sum(len(s.keys) for s in sweeps)),
+                ", ".join(f"{t:g}" for t in targets),
+                f"{plan.settings(sweeps[0].experiment).hold:g}",
+            )
+        self.console.print(table)
+        self.console.print(
+            f"{len(plan.keys)} points, about {plan.duration_s / 60:.0f} min of bench time; highest "
+            f"pressure {max(k.target_kpa for k in plan.keys):g} kPa, limit of the actuator "
+            f"{setup.actuator.limits.pressure / 1e3:g} kPa."
+        )
+
+    def run(self, out: Path | None) -> int:
+        """Take the whole run; returns the exit code of the command."""
+        folder = out or self._free_folder()
+        bench = self._open(folder, segment=0, start_s=0.0)
+        return self._take(
+            folder,
+            bench,
+            lambda observer, check: new_run(folder, bench, self.request, observer, check),
+        )
+
+    def resume(self, folder: Path) -> int:
+        """Take what is left of the run in `folder`; returns the exit code of the command."""
+        reader = RunReader(folder)
+        points = reader.points()
+        done = [point.key for point in points]
+        stop = reader.stop()
+        if stop is not None and stop.exit_status == "success":
+            raise ExperimentError(
+                f"the run {folder} is complete: all {len(done)} points were measured. "
+                f"`rig report {folder}` writes its report again."
+            )
+        bench = self._open(
+            folder,
+            segment=len(reader.resumes()) + 1,
+            start_s=points[-1].measured_to_s if points else 0.0,
+        )
+        return self._take(
+            folder,
+            bench,
+            lambda observer, check: resume_run(folder, bench, self.request, observer, done, check),
+        )
+
+    def _open(self, folder: Path, *, segment: int, start_s: float) -> Bench:
+        setup = self.request.setup
+        if isinstance(setup.bench.board, VirtualBoard):
+            return VirtualBench(
+                setup,
+                self.request.seed,
+                truth_path(folder, segment),
+                segment=segment,
+                start_s=start_s,
+            )
+        return RealBench(setup.bench, setup.calibrations.camera, self._ask, start_s=start_s)
+
+    def _ask(self, instruction: str) -> None:
+        self.console.input(f"{instruction}, then press Enter. ")
+
+    def _take(
+        self,
+        folder: Path,
+        bench: Bench,
+        take: Callable[[Observer, Callable[[], None]], RunOutcome],
+    ) -> int:
+        from rig.report.build import build_report
+
+        try:
+            with catching_signals() as interruption, ProgressObserver(self.console) as observer:
+                outcome = take(observer, interruption.check)
+        finally:
+            bench.close()
+        summary = build_report(folder)
+        show_summary(self.console, summary, folder)
+        if outcome.error is None:
+            return 0
+        ended = outcome.stop.exit_status
+        self.console.print(
+            f"The run was {ended}: {outcome.stop.reason} The bench was made safe and the log is "
+            f"closed; `rig resume {folder}` continues after the last complete point.",
+            style="bold",
+            soft_wrap=True,
+        )
+        return outcome.error.exit_code
+
+    def _free_folder(self) -> Path:
+        setup = self.request.setup
+        stem = f"{setup.actuator.name}-{setup.bench.name}-seed{self.request.seed}"
+        candidates = (self.logs / (stem if n == 1 else f"{stem}-{n}") for n in range(1, 100_000))
+        return next(folder for folder in candidates if not folder.exists())
+
+
+def new_session(actuator: Path, bench: str, protocol: str, seed: int) -> Session:
+    """A session from spec files or names; raises SpecError and LimitError."""
+    workspace = Workspace.find()
+    return _session(workspace.setup(actuator, bench, protocol), seed, workspace.logs)
+
+
+def resumed_session(run: Path) -> Session:
+    """A session from the specs and seed that are recorded in a run."""
+    reader = RunReader(run)
+    texts = {
+        name: data.decode() for name, data in reader.attachments().items() if name.endswith(".yaml")
+    }
+    setup = Setup.from_attachments(texts, reader.path)
+    return _session(setup, reader.start().seed, run.parent)
+
+
+def _session(setup: Setup, seed: int, logs: Path) -> Session:
+    simulated = isinstance(setup.bench.board, VirtualBoard)
+    request = RunRequest(
+        setup=setup,
+        plan=make_plan(setup.protocol, setup.actuator, setup.bench),
+        seed=seed,
+        cavity_volume=float(cavity_volume(setup.actuator.geometry, 0.0)),
+        created=None if simulated else datetime.now().astimezone().isoformat(timespec="seconds"),
+    )
+    return Session(request, logs, Console())
+
+
+def truth_path(folder: Path, segment: int) -> Path:
+    """Where the virtual bench writes what it knew; each resumption of a run has its own file."""
+    return folder / ("truth.mcap" if segment == 0 else f"truth-{segment + 1}.mcap")

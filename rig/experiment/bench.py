@@ -1,0 +1,77 @@
+"""What an experiment needs of a bench, real or simulated; how it keeps people informed."""
+
+from __future__ import annotations
+
+from typing import Literal, Protocol
+
+from rig.experiment.plan import Plan
+from rig.link.bus import FrameBus
+from rig.record.documents import PointDocument, PointKey
+
+Fixture = Literal["free", "blocked"]
+
+
+class Camera(Protocol):
+    """A camera on the side view."""
+
+    def grab(self) -> tuple[float, bytes]:
+        """Bench time in seconds and the JPEG of a frame taken now."""
+        ...
+
+
+class Bench(Protocol):
+    """A bench, opened."""
+
+    @property
+    def bus(self) -> FrameBus:
+        """The link to the board; bench time lives here."""
+        ...
+
+    @property
+    def camera(self) -> Camera:
+        """The camera on the side view."""
+        ...
+
+    def mount(self, fixture: Fixture) -> None:
+        """Free the tip, or block it against the load cell; on a real bench, ask a person to."""
+        ...
+
+    def close(self) -> None:
+        """Release everything."""
+        ...
+
+
+class Observer(Protocol):
+    """Somebody who watches a run."""
+
+    def began(self, plan: Plan, done: int) -> None:
+        """The run begins; `done` points of the plan are there already."""
+        ...
+
+    def stage(self, text: str) -> None:
+        """A step outside the points, as homing."""
+        ...
+
+    def point_began(self, key: PointKey) -> None:
+        """A set-point was sent."""
+        ...
+
+    def point_done(self, point: PointDocument) -> None:
+        """A point is safely on disk."""
+        ...
+
+
+class Nobody:
+    """An observer that looks away."""
+
+    def began(self, plan: Plan, done: int) -> None:
+        """Ignore."""
+
+    def stage(self, text: str) -> None:
+        """Ignore."""
+
+    def point_began(self, key: PointKey) -> None:
+        """Ignore."""
+
+    def point_done(self, point: PointDocument) -> None:
+        """Ignore."""

@@ -1,0 +1,116 @@
+"""The two measurements: bending angle by camera, blocked force by load cell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from rig.experiment.bench import Camera
+from rig.experiment.errors import ExperimentError
+from rig.experiment.evaluate import angle_point, force_point
+from rig.experiment.plan import MEASURE_S
+from rig.experiment.sweep import Arrival, cell_readings
+from rig.link.client import Message, RigLink
+from rig.link.schema import Schema
+from rig.record.documents import AngleReading, PointDocument, PointKey
+from rig.record.writer import RunWriter
+from rig.spec.calibration import CameraCalibration, LoadCellCalibration
+from rig.vision.measure import AngleMeter
+
+RETRY_FACTOR = 2
+"""At most this many times the wanted readings are taken to make up for rejected ones."""
+
+
+def read_angle(meter: AngleMeter, jpeg: bytes, key: PointKey, frame: int) -> AngleReading:
+    """Vision result of one recorded frame; the same for a live run and a replay."""
+    import cv2
+
+    image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+    if image is None:
+        return AngleReading(
+            key=key,
+            frame=frame,
+            angle_deg=None,
+            u_deg=0.0,
+            quality=0.0,
+            accepted=False,
+            reason="the frame is no readable picture",
+        )
+    result = meter.measure(image)
+    return AngleReading(
+        key=key,
+        frame=frame,
+        angle_deg=result.angle_deg,
+        u_deg=result.u_deg,
+        quality=result.quality,
+        accepted=result.accepted,
+        reason=result.reason,
+    )
+
+
+class Measurement(Protocol):
+    """Measures a point that has arrived."""
+
+    def __call__(self, link: RigLink, record: RunWriter, arrival: Arrival) -> PointDocument:
+        """Measure now and put the readings on record."""
+        ...
+
+
+@dataclass(frozen=True)
+class AngleMeasurement:
+    """Takes frames of a still actuator, spread over a second, and measures its angle."""
+
+    camera: Camera
+    meter: AngleMeter
+    calibration: CameraCalibration
+    frames: int
+    frame_period_s: float
+
+    def __call__(self, link: RigLink, record: RunWriter, arrival: Arrival) -> PointDocument:
+        """Measure now; rejected frames are replaced, up to as many again."""
+        from_s = link.now_s
+        spacing_s = max(self.frame_period_s, MEASURE_S / self.frames)
+        messages: list[Message] = []
+        readings: list[AngleReading] = []
+        while (
+            sum(r.accepted for r in readings) < self.frames
+            and len(readings) < RETRY_FACTOR * self.frames
+        ):
+            messages += link.wait(spacing_s)
+            time_s, jpeg = self.camera.grab()
+            reading = read_angle(self.meter, jpeg, arrival.key, len(readings))
+            record.image(time_s, jpeg, arrival.key, reading.frame)
+            record.angle(reading, time_s)
+            readings.append(reading)
+        return angle_point(arrival.visit(from_s, messages), readings, self.calibration)
+
+
+@dataclass(frozen=True)
+class ForceMeasurement:
+    """Averages conversions of the load cell."""
+
+    calibration: LoadCellCalibration
+    readings: int
+    reading_period_s: float
+    schema: Schema
+
+    def __call__(self, link: RigLink, record: RunWriter, arrival: Arrival) -> PointDocument:
+        """Measure now; the readings are on record already, as telemetry."""
+        del record
+        from_s = link.now_s
+        end_s = from_s + RETRY_FACTOR * self.readings * self.reading_period_s + 1.0
+        messages: list[Message] = []
+        good = 0
+        while good < self.readings and link.now_s < end_s:
+            new = [m for m in link.receive() if m.time_s > from_s]
+            messages += new
+            good += sum(r.status == "ok" for r in cell_readings(new, self.schema))
+        if good < self.readings:
+            raise ExperimentError(
+                f"only {good} of {self.readings} load-cell readings came in "
+                f"{link.now_s - from_s:.0f} s; check the HX711 and its cable."
+            )
+        readings = cell_readings(messages, self.schema)
+        return force_point(arrival.visit(from_s, messages), readings, self.calibration)

@@ -1,0 +1,122 @@
+"""Bring a bench from power-on to ready: parameters, home, zero, tare; and back to safe."""
+
+from __future__ import annotations
+
+import math
+
+from rig.experiment.errors import ExperimentError
+from rig.experiment.plan import TRIP_MARGIN
+from rig.link.client import RigLink
+from rig.link.errors import LinkError
+from rig.spec.actuator import ActuatorSpec
+from rig.spec.bench import BenchSpec
+from rig.spec.calibration import TransducerCalibration
+
+HOMING_TIMEOUT_S = 60.0
+VENT_TIMEOUT_S = 60.0
+ZERO_TIMEOUT_S = 10.0
+TARE_TIMEOUT_S = 30.0
+
+
+def board_parameters(
+    bench: BenchSpec,
+    actuator: ActuatorSpec,
+    transducer: TransducerCalibration,
+    cavity_volume: float,
+) -> dict[str, float]:
+    """Parameters to write to the board, by schema name in the unit of the name.
+
+    `cavity_volume` of the actuator in m3 enters the feed-forward only.
+    """
+    area = math.pi * bench.syringe.inner_diameter**2 / 4
+    steps_per_metre = (
+        bench.stepper.steps_per_revolution * bench.stepper.microsteps / bench.lead_screw.lead
+    )
+    volume_per_step = area / steps_per_metre
+    tube = math.pi * bench.tubing.inner_diameter**2 / 4 * bench.tubing.length
+    system = bench.syringe.volume + bench.syringe.dead_volume + tube + cavity_volume
+    controller = bench.controller
+    return {
+        "proportional_ml_s_kpa": controller.proportional * 1e9,
+        "integral_ml_s2_kpa": controller.integral * 1e9,
+        "feed_forward": controller.feed_forward,
+        "deadband_kpa": controller.deadband / 1e3,
+        "max_flow_ml_s": min(controller.max_flow, bench.stepper.max_step_rate * volume_per_step)
+        * 1e6,
+        "max_flow_acceleration_ml_s2": controller.max_flow_acceleration * 1e6,
+        "setpoint_rate_kpa_s": controller.setpoint_rate / 1e3,
+        "syringe_volume_ml": bench.syringe.volume * 1e6,
+        "volume_per_step_ul": volume_per_step * 1e9,
+        "system_volume_ml": system * 1e6,
+        "ambient_pressure_kpa": bench.ambient.pressure / 1e3,
+        "transducer_gain_kpa_v": transducer.gain / 1e3,
+        "transducer_offset_v": transducer.offset_voltage,
+        "adc_reference_v": bench.adc.reference,
+        "pressure_limit_kpa": min(
+            bench.safety.pressure,
+            bench.transducer.pressure_high,
+            TRIP_MARGIN * actuator.limits.pressure,
+        )
+        / 1e3,
+        "communication_timeout_s": bench.safety.communication_timeout,
+    }
+
+
+def write_parameters(link: RigLink, wanted: dict[str, float]) -> dict[str, float]:
+    """Write and read back; returns all parameters in force on the board."""
+    for name, value in wanted.items():
+        link.write_parameter(name, value)
+    return {name: link.read_parameter(name) for name in link.parameter_names}
+
+
+def make_ready(link: RigLink) -> None:
+    """From any state to idle, homed, vented, and zeroed at ambient pressure.
+
+    A latched fault is cleared once: the board refuses if its cause still stands.
+    """
+    link.raise_faults(False)
+    if link.status is not None and link.status.fault != "none":
+        link.command("clear_fault")
+    link.raise_faults(True)
+    link.command("home")
+    link.await_state("idle", HOMING_TIMEOUT_S)
+    link.command("zero_pressure")
+    _await_flag(link, "zeroed", ZERO_TIMEOUT_S, "check that the valve opens to ambient")
+
+
+def tare(link: RigLink) -> None:
+    """Tare the load cell while the actuator is vented."""
+    link.command("tare")
+    _await_flag(link, "tared", TARE_TIMEOUT_S, "check the load cell and its HX711")
+
+
+def vent(link: RigLink) -> None:
+    """Open the valve, bring the plunger home, and wait until the board is idle."""
+    link.command("vent")
+    link.await_state("idle", VENT_TIMEOUT_S)
+
+
+def make_safe(link: RigLink) -> str:
+    """Vent whatever happened before; returns a sentence about how that went.
+
+    Used on the way out of a failed run, so it reports instead of raising.
+    """
+    link.raise_faults(False)
+    try:
+        if link.status is not None and link.status.state == "fault":
+            # the board vents by itself on a fault
+            return "The board vented by itself and holds its fault."
+        vent(link)
+    except LinkError as error:
+        return f"The bench could not be vented from here ({error}) Vent it by hand."
+    return "The bench was vented and the plunger is home."
+
+
+def _await_flag(link: RigLink, flag: str, timeout_s: float, hint: str) -> None:
+    # the heartbeat that acknowledged the command may precede the end of the action
+    end_s = link.now_s + timeout_s
+    while link.now_s < end_s:
+        link.receive()
+        if link.status is not None and getattr(link.status, flag):
+            return
+    raise ExperimentError(f"the board was not {flag} within {timeout_s:g} s; {hint}.")

@@ -1,0 +1,43 @@
+"""Puts everything that comes over the link on record, in batches."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+
+from rig.link.client import Message
+from rig.link.slcan import RawFrame
+from rig.record.writer import RunWriter
+
+BATCH_FRAMES = 1000
+"""Frames gathered before they go to the log; a point flushes them first."""
+
+
+class LinkRecorder:
+    """A tap on the link; `flush` before a point, so that the log holds what the point used."""
+
+    def __init__(self, record: RunWriter) -> None:
+        self._record = record
+        self._frames: list[RawFrame] = []
+        self._messages: list[Message] = []
+
+    def __call__(self, frames: Sequence[RawFrame], messages: Sequence[Message]) -> None:
+        """Take a batch."""
+        self._frames += frames
+        self._messages += messages
+        if len(self._frames) >= BATCH_FRAMES:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write what was gathered."""
+        if not self._frames:
+            return
+        times, ids, payloads = zip(*self._frames, strict=True)
+        self._record.can_frames(times, ids, payloads)
+        by_name: dict[str, list[Message]] = defaultdict(list)
+        for message in self._messages:
+            by_name[message.name].append(message)
+        for name, messages in by_name.items():
+            self._record.telemetry(name, [m.time_s for m in messages], [m.values for m in messages])
+        self._frames.clear()
+        self._messages.clear()

@@ -1,0 +1,223 @@
+"""A run from greeting the board to its stop document; the same for a new and a resumed one."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+import rig
+from rig.errors import RigError
+from rig.experiment.bench import Bench, Fixture, Observer
+from rig.experiment.errors import AbortedError
+from rig.experiment.measure import AngleMeasurement, ForceMeasurement, Measurement
+from rig.experiment.plan import Sweep
+from rig.experiment.prepare import (
+    board_parameters,
+    make_ready,
+    make_safe,
+    tare,
+    vent,
+    write_parameters,
+)
+from rig.experiment.recorder import LinkRecorder
+from rig.experiment.setup import RunRequest
+from rig.experiment.sweep import Arrival, approach, go_to, settle
+from rig.link.client import Identity, RigLink
+from rig.link.schema import load_schema
+from rig.record.documents import (
+    ExperimentName,
+    PointKey,
+    ResumeDocument,
+    StartDocument,
+    StopDocument,
+)
+from rig.record.writer import RunWriter
+from rig.spec.protocol import BlockedForceProtocol, DeformationProtocol
+from rig.vision.measure import AngleMeter
+
+FIXTURES: Mapping[ExperimentName, Fixture] = {"deformation": "free", "blocked_force": "blocked"}
+RECORDED_LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "cantools", "mcap")
+
+
+@dataclass(frozen=True)
+class RunOutcome:
+    """How a run ended; `error` is what stopped it, if anything did."""
+
+    stop: StopDocument
+    error: RigError | None
+
+
+@dataclass(frozen=True)
+class RunContext:
+    """The parts that every step of a run uses."""
+
+    bench: Bench
+    link: RigLink
+    request: RunRequest
+    observer: Observer
+
+
+def new_run(
+    folder: Path,
+    bench: Bench,
+    request: RunRequest,
+    observer: Observer,
+    interrupted: Callable[[], None] | None = None,
+) -> RunOutcome:
+    """Do the whole plan and record it in `folder`.
+
+    A failure after the bench moved ends in a vented bench, a finished log and an outcome with the
+    error; failures before that raise.
+    """
+    link = RigLink(bench.bus, interrupted=interrupted)
+    identity = link.open()
+    parameters = _configure(link, request)
+    setup = request.setup
+    start = StartDocument(
+        actuator=setup.actuator.name,
+        bench=setup.bench.name,
+        board=setup.bench.board.kind,
+        protocol=setup.protocol.name,
+        material=setup.material.name,
+        seed=request.seed,
+        created=request.created,
+        versions=_versions(identity),
+        parameters=parameters,
+    )
+    files = {name: text.encode() for name, text in setup.attachments().items()}
+    files["rig.dbc"] = load_schema().text.encode()
+    context = RunContext(bench, link, request, observer)
+    with RunWriter.create(folder, start, files, units=load_schema().units()) as record:
+        return _recorded(context, record, done=())
+
+
+def resume_run(
+    folder: Path,
+    bench: Bench,
+    request: RunRequest,
+    observer: Observer,
+    done: Collection[PointKey],
+    interrupted: Callable[[], None] | None = None,
+) -> RunOutcome:
+    """Do what is left of the plan and append it to the log in `folder`; see `new_run`."""
+    link = RigLink(bench.bus, interrupted=interrupted)
+    link.open()
+    _configure(link, request)
+    context = RunContext(bench, link, request, observer)
+    with RunWriter.resume(folder, units=load_schema().units()) as record:
+        note = ResumeDocument(resumed_s=link.now_s, points_kept=len(done), seed=request.seed)
+        record.resume_note(note, link.now_s)
+        return _recorded(context, record, done)
+
+
+def _configure(link: RigLink, request: RunRequest) -> dict[str, float]:
+    setup = request.setup
+    wanted = board_parameters(
+        setup.bench, setup.actuator, setup.calibrations.transducer, request.cavity_volume
+    )
+    return write_parameters(link, wanted)
+
+
+def _versions(identity: Identity) -> dict[str, str]:
+    versions = {
+        "rig": rig.__version__,
+        "firmware": identity.firmware_git,
+        "protocol": f"{identity.protocol_version} (schema {identity.schema_crc:04x})",
+        "python": platform.python_version(),
+    }
+    return versions | {name: metadata.version(name) for name in RECORDED_LIBRARIES}
+
+
+def _recorded(context: RunContext, record: RunWriter, done: Collection[PointKey]) -> RunOutcome:
+    link = context.link
+    recorder = LinkRecorder(record)
+    link.set_tap(recorder)
+    error: RigError | None = None
+    try:
+        _experiments(context, record, recorder, frozenset(done))
+        stop = StopDocument(exit_status="success", reason="all points were measured")
+    except (AbortedError, KeyboardInterrupt) as stopped:
+        error = stopped if isinstance(stopped, AbortedError) else AbortedError("interrupted")
+        stop = StopDocument(exit_status="aborted", reason=str(error))
+    except RigError as failure:
+        error = failure
+        stop = StopDocument(exit_status="failed", reason=str(failure))
+    link.ignore_interruptions()
+    context.observer.stage("making the bench safe")
+    ending = make_safe(link)
+    recorder.flush()
+    record.event(link.now_s, "made safe", {"result": ending})
+    record.stop(stop, link.now_s)
+    return RunOutcome(stop, error)
+
+
+def _experiments(
+    context: RunContext, record: RunWriter, recorder: LinkRecorder, done: frozenset[PointKey]
+) -> None:
+    """Every sweep that still has points to take."""
+    link, observer = context.link, context.observer
+    observer.began(context.request.plan, len(done))
+    mounted: ExperimentName | None = None
+    observer.stage("homing the plunger and zeroing the transducer")
+    make_ready(link)
+    for sweep in context.request.plan.sweeps:
+        left = [key for key in sweep.keys if key not in done]
+        if not left:
+            continue
+        if sweep.experiment != mounted:
+            mounted = sweep.experiment
+            observer.stage(f"mounting the tip {FIXTURES[mounted]}")
+            context.bench.mount(FIXTURES[mounted])
+        _sweep(context, record, recorder, sweep, left)
+
+
+def _sweep(
+    context: RunContext,
+    record: RunWriter,
+    recorder: LinkRecorder,
+    sweep: Sweep,
+    left: list[PointKey],
+) -> None:
+    """One repeat: from the vented state through its pressures, and vented again."""
+    link, observer = context.link, context.observer
+    section = context.request.plan.settings(sweep.experiment)
+    measure = _measurement(context, sweep.experiment)
+    observer.stage(f"resting vented before repeat {sweep.repeat}")
+    link.wait(section.rest)
+    if sweep.experiment == "blocked_force":
+        tare(link)
+    approach(link, left[0], section)
+    for key in left:
+        observer.point_began(key)
+        record.event(link.now_s, "point", key.model_dump())
+        started_s = go_to(link, key.target_kpa)
+        settled_s = settle(link, key.target_kpa, section.settling)
+        link.wait(section.hold)
+        point = measure(link, record, Arrival(key, started_s, settled_s))
+        recorder.flush()
+        record.point(point, link.now_s)
+        observer.point_done(point)
+    vent(link)
+
+
+def _measurement(context: RunContext, experiment: ExperimentName) -> Measurement:
+    setup, section = context.request.setup, context.request.plan.settings(experiment)
+    calibrations = setup.calibrations
+    if isinstance(section, DeformationProtocol):
+        return AngleMeasurement(
+            camera=context.bench.camera,
+            meter=AngleMeter(calibrations.camera, calibrations.ruler),
+            calibration=calibrations.camera,
+            frames=section.frames,
+            frame_period_s=1 / setup.bench.camera.frame_rate,
+        )
+    assert isinstance(section, BlockedForceProtocol)
+    return ForceMeasurement(
+        calibration=calibrations.load_cell,
+        readings=section.readings,
+        reading_period_s=1 / setup.bench.load_cell.sample_rate,
+        schema=load_schema(),
+    )

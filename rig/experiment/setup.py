@@ -1,0 +1,21 @@
+"""What an experiment is asked to do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rig.experiment.plan import Plan
+from rig.spec.workspace import Setup
+
+
+@dataclass(frozen=True)
+class RunRequest:
+    """Validated specs, the plan made from them, and what the specs do not hold."""
+
+    setup: Setup
+    plan: Plan
+    seed: int
+    cavity_volume: float
+    """Of the undeformed actuator in m3, for the controller's feed-forward."""
+    created: str | None = None
+    """ISO date and time on a real bench; None in simulated time."""

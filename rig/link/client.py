@@ -1,0 +1,414 @@
+"""The host's side of the link: handshake, acknowledged commands, parameters, telemetry.
+
+Time lives here: an experiment waits only by `receive`, in bench time, so the same code runs
+against a real board and, many times faster, against a simulated one.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from rig.link import e2e
+from rig.link.bus import FrameBus
+from rig.link.errors import (
+    BoardFaultError,
+    CommandRefusedError,
+    IdentityError,
+    LinkError,
+    LinkLostError,
+)
+from rig.link.faults import HINTS
+from rig.link.schema import Schema, load_schema
+from rig.link.slcan import RawFrame
+
+HEARTBEAT_PERIOD_S = 0.2
+POLL_S = 0.1
+"""Bench time of one `receive` while nothing is urgent."""
+ACKNOWLEDGE_POLL_S = 0.02
+RESEND_S = 0.3
+SILENCE_S = 2.0
+"""The link counts as lost when no intact frame came for this long."""
+
+
+class Message(NamedTuple):
+    """A decoded message: bench time in seconds, name and values as in the schema."""
+
+    time_s: float
+    name: str
+    values: dict[str, float | int]
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Who answers at the other end."""
+
+    board: str
+    protocol_version: int
+    schema_crc: int
+    firmware_git: str
+    """First six hexadecimal digits of the firmware's commit."""
+
+
+@dataclass(frozen=True)
+class BoardStatus:
+    """The last heartbeat in words."""
+
+    time_s: float
+    state: str
+    fault: str
+    homed: bool
+    zeroed: bool
+    tared: bool
+    valve_open: bool
+    home_switch: bool
+    end_switch: bool
+    emergency_stop: bool
+    uptime_s: int
+
+
+@dataclass
+class LinkStatistics:
+    """How well the link did."""
+
+    frames: int = 0
+    corrupt: int = 0
+    unknown: int = 0
+    resent_commands: int = 0
+    host_stall_s: float = 0.0
+    """Longest bench time between two of our heartbeats."""
+
+
+Tap = Callable[[Sequence[RawFrame], Sequence[Message]], None]
+"""Sees every batch of received frames with its decoded messages, for the record."""
+
+
+class RigLink:
+    """A conversation with one board.
+
+    `interrupted` is asked in every `receive` and may raise to stop an experiment safely.
+    """
+
+    def __init__(
+        self,
+        bus: FrameBus,
+        schema: Schema | None = None,
+        *,
+        interrupted: Callable[[], None] | None = None,
+    ) -> None:
+        self._bus = bus
+        self._schema = schema or load_schema()
+        self._tap: Tap | None = None
+        self._interrupted = interrupted
+        self._alive: dict[int, int] = {}
+        self._number = 0
+        self._last_heartbeat_s = float("-inf")
+        self._last_intact_s = bus.now_s
+        self._monitor = e2e.AliveMonitor()
+        self._states = self._schema.choices("HEARTBEAT", "state")
+        self._faults = self._schema.choices("HEARTBEAT", "fault_code")
+        self._results = self._schema.choices("HEARTBEAT", "command_result")
+        self._opcodes = {n: v for v, n in self._schema.choices("COMMAND", "opcode").items()}
+        indices = self._schema.choices("PARAMETER_REQUEST", "parameter_index")
+        self._parameters = {name: index for index, name in indices.items()}
+        self.statistics = LinkStatistics()
+        self.identity: Identity | None = None
+        self.status: BoardStatus | None = None
+        self._fault_detail: tuple[str, float, float] | None = None
+        self._raise_faults = True
+
+    @property
+    def now_s(self) -> float:
+        """Bench time in seconds."""
+        return self._bus.now_s
+
+    @property
+    def name(self) -> str:
+        """Where the board is."""
+        return self._bus.name
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Parameters of the board, in the order of their indices."""
+        return tuple(self._parameters)
+
+    @property
+    def frames_lost(self) -> int:
+        """Frames that the alive counters say were lost."""
+        return self._monitor.lost
+
+    # --- receiving -------------------------------------------------------------------------
+
+    def receive(self, duration_s: float = POLL_S) -> list[Message]:
+        """Let bench time pass and return the messages that came.
+
+        Raises BoardFaultError when the board latched a fault, LinkLostError after two seconds
+        of silence, and whatever `interrupted` raises.
+        """
+        if self._interrupted is not None:
+            self._interrupted()
+        self._send_heartbeat_if_due()
+        frames = self._bus.poll(duration_s)
+        messages = [m for f in frames if (m := self._accept(f)) is not None]
+        if self._tap is not None and frames:
+            self._tap(frames, messages)
+        for message in messages:
+            self._note(message)
+        self._check_silence()
+        if self._raise_faults:
+            self._check_fault()
+        return messages
+
+    def wait(self, duration_s: float) -> list[Message]:
+        """Receive for `duration_s` of bench time; return all messages."""
+        end_s = self.now_s + duration_s
+        messages: list[Message] = []
+        while (left_s := end_s - self.now_s) > 1e-9:
+            messages += self.receive(min(POLL_S, left_s))
+        return messages
+
+    def _accept(self, frame: RawFrame) -> Message | None:
+        if not e2e.is_intact(frame.frame_id, frame.payload):
+            self.statistics.corrupt += 1
+            return None
+        if not self._monitor.observe(frame.frame_id, frame.payload):
+            return None
+        decoded = self._schema.decode(frame.frame_id, frame.payload)
+        if decoded is None:
+            self.statistics.unknown += 1
+            return None
+        self.statistics.frames += 1
+        self._last_intact_s = self.now_s
+        return Message(frame.time_s, *decoded)
+
+    def _note(self, message: Message) -> None:
+        values = message.values
+        if message.name == "HEARTBEAT":
+            self.status = BoardStatus(
+                time_s=message.time_s,
+                state=self._states.get(int(values["state"]), "unknown"),
+                fault=self._faults.get(int(values["fault_code"]), "unknown"),
+                homed=bool(values["homed"]),
+                zeroed=bool(values["zeroed"]),
+                tared=bool(values["tared"]),
+                valve_open=bool(values["valve_open"]),
+                home_switch=bool(values["home_switch"]),
+                end_switch=bool(values["end_switch"]),
+                emergency_stop=bool(values["emergency_stop"]),
+                uptime_s=int(values["uptime_s"]),
+            )
+        elif message.name == "FAULT":
+            code = self._faults.get(int(values["code"]), "unknown")
+            found_s = message.time_s - float(values["age_s"])
+            self._fault_detail = (code, float(values["fault_value"]), found_s)
+
+    def _check_silence(self) -> None:
+        silent_s = self.now_s - self._last_intact_s
+        if silent_s > SILENCE_S:
+            raise LinkLostError(
+                f"nothing intelligible came from the board at {self._bus.name} for "
+                f"{silent_s:.1f} s (frames with a wrong checksum: {self.statistics.corrupt}). "
+                "The firmware's own watchdog vents the bench. Check the cable and the board's "
+                "power, then `rig resume` the run."
+            )
+
+    def _check_fault(self) -> None:
+        if self.status is None or self.status.fault == "none":
+            return
+        code = self.status.fault
+        value, time_s = None, self.status.time_s
+        if self._fault_detail is not None and self._fault_detail[0] == code:
+            _, value, time_s = self._fault_detail
+        raise BoardFaultError(code, value, time_s, HINTS.get(code, ""))
+
+    # --- sending ---------------------------------------------------------------------------
+
+    def _send(self, message: str, **values: float) -> None:
+        frame_id, payload = self._schema.encode(message, values)
+        alive = self._alive.get(frame_id, -1) + 1
+        self._alive[frame_id] = alive % e2e.ALIVE_COUNT
+        self._bus.send(frame_id, e2e.protect(frame_id, payload, alive))
+
+    def _send_heartbeat_if_due(self) -> None:
+        since_s = self.now_s - self._last_heartbeat_s
+        if since_s >= HEARTBEAT_PERIOD_S - 1e-9:
+            if since_s < float("inf"):
+                self.statistics.host_stall_s = max(self.statistics.host_stall_s, since_s)
+            self._last_heartbeat_s = self.now_s
+            self._send("HOST_HEARTBEAT", protocol_version=self._schema.protocol_version)
+
+    def _next_number(self) -> int:
+        self._number = self._number % 255 + 1
+        return self._number
+
+    def open(self, timeout_s: float = 5.0) -> Identity:
+        """Greet the board and check that both ends speak the same schema.
+
+        Raises LinkLostError if nothing answers and IdentityError on a version mismatch.
+        """
+        self._raise_faults = False
+        answer = self._ask("IDENTITY_REQUEST", "IDENTITY", {}, timeout_s, numbered=False)
+        kinds = self._schema.choices("IDENTITY", "board_kind")
+        identity = Identity(
+            board=kinds.get(int(answer["board_kind"]), "unknown"),
+            protocol_version=int(answer["protocol_version"]),
+            schema_crc=int(answer["schema_crc"]),
+            firmware_git=f"{int(answer['firmware_git']):06x}",
+        )
+        ours = (self._schema.protocol_version, self._schema.crc)
+        theirs = (identity.protocol_version, identity.schema_crc)
+        if theirs != ours:
+            raise IdentityError(
+                f"the firmware at {self._bus.name} (commit {identity.firmware_git}) speaks "
+                f"protocol {theirs[0]} with schema {theirs[1]:04x}, this host speaks protocol "
+                f"{ours[0]} with schema {ours[1]:04x}. Nothing was moved. Flash the firmware "
+                "that belongs to this version of rig, or install the rig that belongs to it."
+            )
+        self.identity = identity
+        # numbers of an earlier conversation must not look like repeats of ours
+        self._await_heartbeat(timeout_s)
+        return identity
+
+    def _await_heartbeat(self, timeout_s: float) -> None:
+        end_s = self.now_s + timeout_s
+        while self.now_s < end_s:
+            for message in self.receive(ACKNOWLEDGE_POLL_S):
+                if message.name == "HEARTBEAT":
+                    self._number = int(message.values["command_number"])
+                    return
+        raise LinkLostError(
+            f"the board at {self._bus.name} answered but sends no heartbeat; reset the board."
+        )
+
+    def set_tap(self, tap: Tap | None) -> None:
+        """Whom to show every batch of frames and messages from now on."""
+        self._tap = tap
+
+    def ignore_interruptions(self) -> None:
+        """Stop asking `interrupted`: the bench is being made safe."""
+        self._interrupted = None
+
+    def raise_faults(self, enabled: bool) -> None:
+        """Whether `receive` raises BoardFaultError; off while making the bench safe."""
+        self._raise_faults = enabled
+
+    def command(self, opcode: str, argument: float = 0.0, timeout_s: float = 2.0) -> None:
+        """Send a command and wait for its acknowledgement; it is sent again until then.
+
+        `argument` is in the unit of the command (kPa for set_pressure, mL/s for jog). Raises
+        CommandRefusedError with the board's reason, LinkLostError when no answer comes.
+        """
+        number = self._next_number()
+        values = {"opcode": self._opcodes[opcode], "number": number, "argument": argument}
+        end_s = self.now_s + timeout_s
+        sent_s = float("-inf")
+        while self.now_s < end_s:
+            if self.now_s - sent_s >= RESEND_S:
+                self.statistics.resent_commands += sent_s > float("-inf")
+                sent_s = self.now_s
+                self._send("COMMAND", **values)
+            for message in self.receive(ACKNOWLEDGE_POLL_S):
+                if message.name == "HEARTBEAT" and message.values["command_number"] == number:
+                    result = self._results.get(int(message.values["command_result"]), "unknown")
+                    if result != "accepted":
+                        state = self.status.state if self.status else "unknown"
+                        raise CommandRefusedError(
+                            f"the board refused '{opcode}' ({argument:g}): {result}; its state "
+                            f"is '{state}'. {_REFUSAL_HINTS.get(result, '')}"
+                        )
+                    return
+        raise LinkLostError(
+            f"the board at {self._bus.name} did not acknowledge '{opcode}' within {timeout_s:g} s; "
+            "check the cable and the board."
+        )
+
+    def await_state(self, wanted: str, timeout_s: float) -> None:
+        """Receive until the board is in the state `wanted`."""
+        end_s = self.now_s + timeout_s
+        while self.now_s < end_s:
+            self.receive()
+            if self.status is not None and self.status.state == wanted:
+                return
+        state = self.status.state if self.status else "unknown"
+        raise LinkError(
+            f"the board did not reach the state '{wanted}' within {timeout_s:g} s; it is in "
+            f"'{state}'. Check the plunger, the home switch and the valve."
+        )
+
+    # --- parameters ------------------------------------------------------------------------
+
+    def read_parameter(self, name: str) -> float:
+        """Value of a parameter in the unit of its name."""
+        return self._parameter("read", name, 0.0)
+
+    def write_parameter(self, name: str, value: float) -> float:
+        """Set a parameter; returns the value now in force (single precision).
+
+        Raises CommandRefusedError when the board finds it out of range.
+        """
+        echoed = self._parameter("write", name, value)
+        (expected,) = struct.unpack("<f", struct.pack("<f", value))
+        if echoed != expected:
+            raise LinkError(
+                f"the board holds {echoed:g} for the parameter {name} after {value:g} was written"
+            )
+        return echoed
+
+    def _parameter(self, operation: str, name: str, value: float) -> float:
+        operations = {
+            n: v for v, n in self._schema.choices("PARAMETER_REQUEST", "operation").items()
+        }
+        request = {
+            "operation": operations[operation],
+            "parameter_index": self._parameters[name],
+            "parameter_value": value,
+        }
+        answer = self._ask("PARAMETER_REQUEST", "PARAMETER", request, 2.0, numbered=True)
+        results = self._schema.choices("PARAMETER", "parameter_result")
+        result = results.get(int(answer["parameter_result"]), "unknown")
+        if result != "accepted":
+            raise CommandRefusedError(
+                f"the board refused to {operation} the parameter {name} = {value:g}: {result}; "
+                "check the matching field of the bench spec."
+            )
+        return float(answer["parameter_value"])
+
+    def _ask(
+        self,
+        request: str,
+        reply: str,
+        values: dict[str, float],
+        timeout_s: float,
+        *,
+        numbered: bool,
+    ) -> dict[str, float | int]:
+        """Send a request until its reply comes; return the reply's values."""
+        number = self._next_number()
+        end_s = self.now_s + timeout_s
+        sent_s = float("-inf")
+        while self.now_s < end_s:
+            if self.now_s - sent_s >= RESEND_S:
+                sent_s = self.now_s
+                self._send(request, number=number, **values)
+            for message in self.receive(ACKNOWLEDGE_POLL_S):
+                if message.name == reply and (not numbered or message.values["number"] == number):
+                    return message.values
+        raise LinkLostError(
+            f"no answer from {self._bus.name} within {timeout_s:g} s: is it a rig board, is it "
+            "powered, and is no other program using the port?"
+        )
+
+    def close(self) -> None:
+        """Release the bus."""
+        self._bus.close()
+
+
+_REFUSAL_HINTS = {
+    "out_of_range": "Choose a value within the board's limits (safety section of the bench).",
+    "wrong_state": "Wait until the board is idle, or vent first.",
+    "not_homed": "Home the plunger first.",
+    "faulted": "Remove the cause, then clear the fault.",
+    "busy": "Wait until the running action has ended.",
+}

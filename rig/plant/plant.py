@@ -1,0 +1,236 @@
+"""The virtual bench's physics, stepped in C at 1 ms; this wraps it and fills its parameters.
+
+The truth it holds is read by `rig.board` for a file of its own and by tests, never by experiments.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+
+from rig.plant._plant import ffi, lib
+from rig.plant.specimen import Specimen
+from rig.spec.bench import BenchSpec
+from rig.spec.calibration import LoadCellCalibration, TransducerCalibration
+
+AIR_VISCOSITY = 1.82e-5
+"""Pa s at 20 degC (CRC Handbook of Chemistry and Physics)."""
+GRAVITY = 9.80665
+REFERENCE_LEAK_PRESSURE = 10e3
+"""Gauge pressure in Pa at which a bench spec states its leak."""
+RESPONSE_TIME = 0.02
+"""s by which the shape lags the pressure: a guess until the mass and damping are modelled."""
+PLAY_RADII = (0.05, 0.15, 0.30)
+"""Radii of the hysteresis' play operators, relative to the actuator's pressure limit."""
+TABLE_LENGTH = int(lib.PLANT_TABLE)
+
+
+class Fixture(IntEnum):
+    """How the tip is held."""
+
+    FREE = int(lib.PLANT_FREE)
+    BLOCKED = int(lib.PLANT_BLOCKED)
+
+
+@dataclass(frozen=True)
+class Faults:
+    """Scripted faults of the bench; the default is healthy."""
+
+    leak_factor: float = 0.0
+    sensor_open: bool = False
+    sensor_short: bool = False
+    sensor_stuck: bool = False
+    hx711_silent: bool = False
+    motor_stalled: bool = False
+    emergency_stop: bool = False
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What is really so at one instant; SI units."""
+
+    time: float
+    gauge_pressure: float
+    angle: float
+    force: float
+    actuator_volume: float
+    pushed_volume: float
+    gas_moles: float
+    temperature: float
+
+
+@dataclass(frozen=True)
+class HiddenErrors:
+    """How this bench's instruments differ from their calibrations, and where the plunger stands.
+
+    Drawn once from the stated uncertainties, so that those are true to the bench.
+    """
+
+    transducer_gain: float
+    """Relative error of the gain."""
+    transducer_offset: float
+    """Gauge pressure in Pa that the transducer shows at ambient before zeroing."""
+    counts_per_gram: float
+    """Relative error of the load cell's sensitivity."""
+    load_cell_zero_counts: float
+    start_volume: float
+    """Volume in m3 by which the plunger is pushed in at power-on."""
+
+    @staticmethod
+    def draw(
+        bench: BenchSpec,
+        transducer: TransducerCalibration,
+        load_cell: LoadCellCalibration,
+        rng: np.random.Generator,
+    ) -> HiddenErrors:
+        """Draw the errors for one bench."""
+        assert bench.virtual is not None
+        sensors = bench.virtual.sensors
+        return HiddenErrors(
+            transducer_gain=rng.normal(0, transducer.gain_u),
+            transducer_offset=rng.normal(0, sensors.transducer_offset),
+            counts_per_gram=rng.normal(0, load_cell.counts_per_gram_u),
+            load_cell_zero_counts=rng.normal(0, 20 * load_cell.counts_per_gram),
+            start_volume=bench.syringe.volume * rng.uniform(0.02, 0.2),
+        )
+
+
+class Plant:
+    """One simulated bench with its specimen; advanced by the firmware's host HAL."""
+
+    def __init__(self, parameters: dict[str, Any], specimen: Specimen, seed: int) -> None:
+        self.parameters = dict(parameters)
+        self._parameters = ffi.new("plant_parameters *", parameters)
+        self._response = ffi.new("plant_response *")
+        pressure = specimen.pressure
+        grid = np.linspace(pressure[0], pressure[-1], TABLE_LENGTH)
+        self._response.table_low, self._response.table_high = grid[0], grid[-1]
+        for name in ("angle", "blocked_force", "volume_free", "volume_blocked"):
+            values = np.interp(grid, pressure, getattr(specimen, name))
+            ffi.memmove(getattr(self._response, name), ffi.from_buffer(values), values.nbytes)
+        self._plant = ffi.gc(lib.plant_new(self._parameters, self._response, seed), lib.plant_free)
+        self._truth = ffi.new("plant_truth *")
+        self._idle = ffi.new("rig_pins_out *", {"valve_open": 1})
+        self._pins = ffi.new("rig_pins_in *")
+
+    @property
+    def step_address(self) -> int:
+        """Address of the C function that advances the bench by 1 ms (a rig_bench_fn)."""
+        return int(ffi.cast("uintptr_t", ffi.addressof(lib, "plant_do_step")))
+
+    @property
+    def state_address(self) -> int:
+        """Address of the C object to hand to that function."""
+        return int(ffi.cast("uintptr_t", self._plant))
+
+    def run(
+        self, milliseconds: int, *, steps: int = 0, valve_open: bool = False, enabled: bool = True
+    ) -> Any:
+        """Advance without firmware: `steps` pulses in each millisecond; returns the input pins."""
+        out = ffi.new(
+            "rig_pins_out *",
+            {"steps": steps, "motor_enabled": enabled, "valve_open": valve_open},
+        )
+        lib.plant_run(self._plant, out, self._pins, milliseconds)
+        return self._pins
+
+    def set_fixture(self, fixture: Fixture) -> None:
+        """Free the tip, or block it against the load cell."""
+        lib.plant_set_fixture(self._plant, int(fixture))
+
+    def set_faults(self, faults: Faults) -> None:
+        """Break things, or heal them."""
+        lib.plant_set_faults(self._plant, ffi.new("plant_faults *", vars(faults)))
+
+    def truth(self) -> Truth:
+        """What is really so now."""
+        lib.plant_get_truth(self._plant, self._truth)
+        t = self._truth
+        return Truth(
+            t.time,
+            t.gauge_pressure,
+            t.angle,
+            t.force,
+            t.actuator_volume,
+            t.pushed_volume,
+            t.gas_moles,
+            t.temperature,
+        )
+
+    def save(self) -> bytes:
+        """The whole state, random generator included."""
+        buffer = ffi.new("char[]", int(lib.plant_state_size()))
+        lib.plant_save(self._plant, buffer)
+        return bytes(ffi.buffer(buffer))
+
+    def restore(self, state: bytes) -> None:
+        """Return to a saved state; raises ValueError if it is not one of this build."""
+        if len(state) != lib.plant_state_size():
+            raise ValueError(
+                f"a plant state has {lib.plant_state_size()} bytes, this has {len(state)}"
+            )
+        lib.plant_restore(self._plant, ffi.from_buffer(state))
+
+
+def plant_parameters(
+    bench: BenchSpec,
+    transducer: TransducerCalibration,
+    load_cell: LoadCellCalibration,
+    specimen: Specimen,
+    errors: HiddenErrors,
+    pressure_limit: float,
+) -> dict[str, Any]:
+    """Parameters of the C plant from the specs; SI units.
+
+    `pressure_limit` in Pa scales the hysteresis of the specimen.
+    """
+    assert bench.virtual is not None
+    virtual = bench.virtual
+    area = np.pi * bench.syringe.inner_diameter**2 / 4
+    steps_per_metre = (
+        bench.stepper.steps_per_revolution * bench.stepper.microsteps / bench.lead_screw.lead
+    )
+    radius = bench.tubing.inner_diameter / 2
+    tube_resistance = 8 * AIR_VISCOSITY * bench.tubing.length / (np.pi * radius**4)
+    counts_per_newton = (
+        load_cell.counts_per_gram * (1 + errors.counts_per_gram) / (1e-3 * GRAVITY)
+    )
+    gain = transducer.gain * (1 + errors.transducer_gain)
+    return {
+        "ambient_pressure": bench.ambient.pressure,
+        "ambient_temperature": bench.ambient.temperature,
+        "volume_per_step": area / steps_per_metre,
+        "backlash_volume": area * bench.lead_screw.backlash,
+        "syringe_volume": bench.syringe.volume,
+        "dead_volume": bench.syringe.dead_volume,
+        "start_volume": errors.start_volume,
+        "tube_volume": np.pi * radius**2 * bench.tubing.length,
+        "tube_resistance": tube_resistance,
+        # the valve vents through a short piece of the same tube (a guess; the paper has no valve)
+        "valve_resistance": tube_resistance,
+        "leak_conductance": virtual.pneumatics.leak / REFERENCE_LEAK_PRESSURE,
+        "heat_exchange_time": virtual.pneumatics.heat_exchange_time,
+        "response_time": RESPONSE_TIME,
+        "creep_share": specimen.creep_share,
+        "creep_time": specimen.creep_time,
+        "play_share": specimen.hysteresis,
+        "play_radius": [r * pressure_limit for r in PLAY_RADII],
+        "transducer_gain": gain,
+        "transducer_voltage_at_zero": transducer.offset_voltage + errors.transducer_offset / gain,
+        "transducer_noise": virtual.sensors.transducer_noise,
+        "adc_reference": bench.adc.reference,
+        "adc_levels": 2.0**bench.adc.bits,
+        "counts_per_newton": counts_per_newton,
+        "load_cell_zero_counts": errors.load_cell_zero_counts,
+        "load_cell_noise_counts": virtual.sensors.load_cell_noise * GRAVITY * counts_per_newton,
+        "load_cell_creep_share": virtual.sensors.load_cell_creep,
+        "load_cell_creep_time": virtual.sensors.load_cell_creep_time,
+        "load_cell_period": 1 / bench.load_cell.sample_rate,
+        "bad_word_probability": min(
+            1.0,
+            1 / (bench.load_cell.sample_rate * virtual.sensors.bad_word_interval),
+        ),
+    }

@@ -1,0 +1,65 @@
+"""Builds rig; what the static metadata in pyproject.toml cannot say.
+
+The model library lives beside the package, where people edit it; a wheel carries it inside.
+Two extensions are compiled by cffi: the firmware's core for this machine, and the bench's physics.
+"""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+from setuptools import setup
+from setuptools.command.build_py import build_py
+
+ROOT = Path(__file__).resolve().parent
+LIBRARY = ("models/**/*", "calibration/*", "firmware/rig.dbc")
+
+
+def revision() -> str:
+    """The commit that is built; zeros outside a checkout."""
+    try:
+        answer = subprocess.run(
+            ["git", "rev-parse", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=True
+        )
+    except (OSError, subprocess.CalledProcessError):
+        return "000000"
+    return answer.stdout.strip()
+
+
+class BuildWithLibrary(build_py):
+    """Puts the files of LIBRARY into the wheel as rig/_library; a checkout uses them in place."""
+
+    def run(self) -> None:
+        """Build as usual, then copy the library."""
+        super().run()
+        if not self.editable_mode:
+            for source, target in self._library_files():
+                target.parent.mkdir(parents=True, exist_ok=True)
+                self.copy_file(str(source), str(target), preserve_mode=False)
+            self._revision_file().write_text(revision(), encoding="ascii")
+
+    def get_outputs(self, include_bytecode: bool = True) -> list[str]:
+        """Every file that the build makes, so that an uninstall finds them all."""
+        outputs = super().get_outputs(include_bytecode)
+        if self.editable_mode:
+            return outputs
+        files = [target for _, target in self._library_files()] + [self._revision_file()]
+        return [*outputs, *map(str, files)]
+
+    def _revision_file(self) -> Path:
+        return Path(self.build_lib) / "rig" / "_library" / "REVISION"
+
+    def _library_files(self) -> list[tuple[Path, Path]]:
+        library = Path(self.build_lib) / "rig" / "_library"
+        sources = sorted(p for glob in LIBRARY for p in ROOT.glob(glob) if p.is_file())
+        return [(source, library / source.relative_to(ROOT)) for source in sources]
+
+
+setup(
+    cmdclass={"build_py": BuildWithLibrary},
+    cffi_modules=[
+        "firmware/host/build_firmware.py:ffibuilder",
+        "rig/plant/native/build_plant.py:ffibuilder",
+    ],
+)
