@@ -40,7 +40,7 @@ class BellowBendingGeometry(SpecModel):
         problems = []
         arc_mm = self.arc_radius * 1e3
         t_mm = self.wall_thickness * 1e3
-        if self.wall_thickness >= self.arc_radius:
+        if self.wall_thickness >= self.arc_radius * (1 - 1e-12):  # equal but for rounding
             problems.append(
                 f"the wall does not fit into the arcs: t = {t_mm:.3g} mm must be below "
                 f"L/(4N) = {arc_mm:.3g} mm (eq. 1); reduce wall_thickness below {arc_mm:.3g} mm, "

@@ -87,7 +87,7 @@ def _wrong_tag(
 ) -> Problem:
     context = details.get("ctx", {})
     key = str(context["discriminator"]).strip("'")
-    alternatives = _models(field.annotation) if field is not None else []
+    alternatives = models_in(field.annotation) if field is not None else []
     expected = [str(name) for m in alternatives for name in _choices(m.model_fields[key])]
     location = (*location, key)
     if details["type"] == "union_tag_not_found":
@@ -121,9 +121,9 @@ def _expected(field: FieldInfo | None, location: Location) -> str:
         return "a value"
     if location and isinstance(location[-1], int):
         return _type_words(get_args(field.annotation)[0])
-    unit = _unit(field)
+    unit = unit_of(field)
     choices = _choices(field)
-    models = _models(field.annotation)
+    models = models_in(field.annotation)
     if choices:
         what = one_of([str(name) for name in choices])
     elif models:
@@ -150,7 +150,8 @@ def _bounds(field: FieldInfo, unit: Unit | None) -> str:
     return f", {' and '.join(limits)}" if limits else ""
 
 
-def _unit(field: FieldInfo) -> Unit | None:
+def unit_of(field: FieldInfo) -> Unit | None:
+    """The quantity that a field holds; None if it is something else."""
     return next((m for m in field.metadata if isinstance(m, Unit)), None)
 
 
@@ -205,7 +206,7 @@ def _walk(
             continue  # an item of a list: same candidates
         owner = candidates[0] if candidates else None
         field = owner.model_fields.get(part) if owner is not None else None
-        candidates = _models(field.annotation) if field is not None else []
+        candidates = models_in(field.annotation) if field is not None else []
     return owner, field, location
 
 
@@ -220,13 +221,13 @@ def _has_tag(model: type[BaseModel], part: int | str) -> bool:
     )
 
 
-def _models(annotation: Any) -> list[type[BaseModel]]:
+def models_in(annotation: Any) -> list[type[BaseModel]]:
     """Models inside an annotation: of unions, optionals and lists."""
     origin = get_origin(annotation)
     if origin is Annotated:
-        return _models(get_args(annotation)[0])
+        return models_in(get_args(annotation)[0])
     if origin in (Union, types.UnionType, tuple, list):
-        return [m for inner in get_args(annotation) for m in _models(inner)]
+        return [m for inner in get_args(annotation) for m in models_in(inner)]
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return []

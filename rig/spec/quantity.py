@@ -181,8 +181,12 @@ class Unit:
 
     def in_lab_units(self, value: float) -> str:
         """`66 mm` for 0.066: how people would write the SI value."""
+        return f"{self.to_lab(value):.12g} {self.lab}".strip()
+
+    def to_lab(self, value: float) -> float:
+        """The SI value in the lab unit, rounded to 12 digits: 66.0 for 0.066."""
         scaled = _registry().Quantity(value, self.si).to(self.lab).magnitude
-        return f"{float(f'{scaled:.12g}'):g} {self.lab}".strip()
+        return float(f"{scaled:.12g}")
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler

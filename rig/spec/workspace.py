@@ -182,8 +182,8 @@ class Workspace:
             names = self.names(kind)
             known = f", or a name from {folder}: {', '.join(names)}" if names else ""
             raise SpecError([Problem(given, message + known)])
-        name = str(reference)
-        message = f"{show(name)} is no {kind} there{did_you_mean(name, self.names(kind))}"
+        wanted = str(reference)
+        message = f"{show(wanted)} is no {kind} there{did_you_mean(wanted, self.names(kind))}"
         raise SpecError([Problem(folder, message)])
 
     def actuator(self, reference: str | Path) -> ActuatorSpec:
