@@ -1,0 +1,115 @@
+#include "plunger_motion.h"
+
+#include <math.h>
+
+#include "tick.h"
+
+namespace rig {
+
+namespace {
+
+// What the step interrupt of the Mega can give, whatever the parameters say.
+constexpr float kMaxStepsPerTick = 48;  // 24 kHz
+
+// Rounded away from zero.
+int32_t nearest(float x) { return static_cast<int32_t>(x < 0 ? x - 0.5f : x + 0.5f); }
+
+}  // namespace
+
+void PlungerMotion::configure(const Parameters &parameters) {
+  const Volume per_step = parameters.volume_per_step();
+  if (per_step < per_step_ || per_step > per_step_) homed_ = false;
+  per_step_ = per_step;
+  travel_ = parameters.syringe_volume();
+  acceleration_ = parameters.max_flow_acceleration();
+  const Flow fastest = per_step * kMaxStepsPerTick / kTick;
+  max_flow_ = parameters.max_flow() < fastest ? parameters.max_flow() : fastest;
+}
+
+void PlungerMotion::set_velocity(Flow velocity) {
+  mode_ = Mode::kVelocity;
+  target_velocity_ = velocity;
+}
+
+void PlungerMotion::move_to(Volume target, Flow speed) {
+  mode_ = Mode::kPosition;
+  target_ = target;
+  speed_ = speed;
+}
+
+void PlungerMotion::stop_at_once() {
+  set_velocity({});
+  velocity_ = {};
+}
+
+void PlungerMotion::set_position(Volume position) {
+  const float steps = position / per_step_;
+  steps_ = nearest(steps);
+  fraction_ = 0;
+  homed_ = true;
+}
+
+Volume PlungerMotion::position() const {
+  return per_step_ * (static_cast<float>(steps_) + fraction_);
+}
+
+bool PlungerMotion::arrived() const {
+  if (moving()) return false;
+  return mode_ == Mode::kVelocity || magnitude(target_ - position()) <= per_step_;
+}
+
+// The speed from which the plunger can still stop within `distance`, in steps of one tick:
+// v T + (v - a T) T + ... = v^2/2a + v T/2 = d.
+Flow PlungerMotion::braking(Volume distance) const {
+  if (distance <= Volume{}) return {};
+  const float a = acceleration_.value;
+  const float half = 0.5f * a * to_seconds(kTick);
+  const float v = sqrtf(half * half + 2.0f * a * to_ml(distance)) - half;
+  const Flow in_one_tick = distance / kTick;
+  return ml_s(v) < in_one_tick ? ml_s(v) : in_one_tick;
+}
+
+Flow PlungerMotion::wanted() const {
+  if (mode_ == Mode::kVelocity) return clamp(target_velocity_, -max_flow_, max_flow_);
+  const Volume left = target_ - position();
+  if (magnitude(left) <= per_step_ * 0.5f) return {};
+  Flow speed = braking(magnitude(left));
+  if (speed > speed_) speed = speed_;
+  if (speed > max_flow_) speed = max_flow_;
+  return left < Volume{} ? -speed : speed;
+}
+
+Flow PlungerMotion::within_travel(Flow wanted) {
+  blocked_ = 0;
+  if (!homed_) return wanted;
+  const Volume here = position();
+  if (wanted >= Flow{}) {
+    const Flow inward = braking(travel_ - here);
+    if (wanted <= inward) return wanted;
+    if (travel_ - here <= per_step_) blocked_ = 1;
+    return inward;
+  }
+  if (seeking_home_) return wanted;
+  const Flow outward = -braking(here);
+  if (wanted >= outward) return wanted;
+  if (here <= per_step_) blocked_ = -1;
+  return outward;
+}
+
+StepSchedule PlungerMotion::tick() {
+  const Flow goal = within_travel(wanted());
+  const Flow change = acceleration_ * kTick;
+  velocity_ += clamp(goal - velocity_, -change, change);
+  const float travel = (velocity_ * kTick) / per_step_;
+  if (!(travel < 0) && !(travel > 0)) return kNoSteps;
+  const bool inward = travel > 0;
+  const float phase = inward ? fraction_ : -fraction_;
+  const float end = fraction_ + travel;
+  const int32_t whole = static_cast<int32_t>(end);  // towards zero
+  fraction_ = end - static_cast<float>(whole);
+  steps_ += whole;
+  if (whole == 0) return kNoSteps;
+  return schedule_steps(inward, phase, inward ? travel : -travel);
+}
+
+}  // namespace rig

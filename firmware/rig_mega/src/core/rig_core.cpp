@@ -1,0 +1,381 @@
+#include "rig_core.h"
+
+#include "generated/rig.h"
+#include "generated/schema.h"
+#include "tick.h"
+
+namespace rig {
+
+namespace {
+
+constexpr uint16_t kBootTicks = ticks_of_ms(100);  // the filters fill
+constexpr uint16_t kSecondTicks = ticks_of_ms(1000);
+constexpr uint8_t kHeartbeatTicks = ticks_of_ms(100);
+constexpr uint8_t kPressureTicks = ticks_of_ms(20);
+constexpr uint8_t kControllerTicks = ticks_of_ms(100);
+constexpr uint16_t kJogTicks = ticks_of_ms(500);
+// With the home switch closed the plunger cannot be further in than this.
+constexpr Volume kFalseHome = ml(1.0f);
+
+Finding boot_finding(ResetCause cause, Parameters::Image image) {
+  if (cause == ResetCause::kWatchdog) return {Fault::kWatchdogReset, 0.0f};
+  if (cause == ResetCause::kBrownOut) return {Fault::kBrownOut, 0.0f};
+  if (image == Parameters::Image::kCorrupt) return {Fault::kParametersCorrupt, 0.0f};
+  return kNoFinding;
+}
+
+// Counts up to `period`, then starts over and says so.
+template <typename Counter>
+bool every(Counter period, Counter &counter) {
+  if (++counter < period) return false;
+  counter = 0;
+  return true;
+}
+
+}  // namespace
+
+RigCore::RigCore(const BoardInfo &board, const uint8_t *nonvolatile_image) : board_(board) {
+  boot_finding_ = boot_finding(board.reset_cause, parameters_.load(nonvolatile_image));
+  configure();
+  pressure_monitor_.reset();
+  outputs_ = {kNoSteps, false, true};
+}
+
+void RigCore::configure() {
+  transducer_.configure(parameters_);
+  pressure_monitor_.configure(parameters_);
+  motion_.configure(parameters_);
+}
+
+// --- a tick ------------------------------------------------------------------------------------
+
+void RigCore::tick(const Inputs &inputs) {
+  sense(inputs);
+  watch(inputs);
+  act(inputs);
+  report();
+}
+
+void RigCore::sense(const Inputs &inputs) {
+  inputs_ = inputs;
+  link_.tick();
+  safety_.tick();
+  transducer_.sample(inputs.adc_sum, inputs.adc_count);
+  if (zeroing_.tick(transducer_.tick_voltage())) {
+    zeroed_ = transducer_.zero(zeroing_.mean(), parameters_.zero_limit());
+  }
+}
+
+void RigCore::watch(const Inputs &inputs) {
+  const Finding finding = find_fault(inputs);
+  if (safety_.state() == State::kBoot) {
+    if (++boot_ticks_ < kBootTicks) return;
+    enter(State::kIdle);
+    if (boot_finding_.fault != Fault::kNone) react_to(boot_finding_);
+    return;
+  }
+  if (finding.fault != Fault::kNone) react_to(finding);
+}
+
+// The most immediate danger first. Every monitor runs in every tick, so that none is out of date.
+Finding RigCore::find_fault(const Inputs &inputs) {
+  const State state = safety_.state();
+  const Finding pressure = pressure_monitor_.tick(
+      transducer_, {inputs.adc_count != 0, !safety_.valve_open(), motion_.position()});
+  const Finding cell = load_cell_.tick(parameters_.hx711_timeout());
+  const Finding findings[] = {
+      inputs.emergency_stop ? Finding{Fault::kEmergencyStop, 0.0f} : kNoFinding,
+      watch_travel(inputs),
+      pressure,
+      state == State::kRun ? watch_regulation() : kNoFinding,
+      cell,
+      watch_host(),
+  };
+  for (const Finding &finding : findings) {
+    if (finding.fault != Fault::kNone) return finding;
+  }
+  return kNoFinding;
+}
+
+Finding RigCore::watch_travel(const Inputs &inputs) {
+  const State state = safety_.state();
+  const bool pushing = motion_.velocity() > Flow{};
+  const bool lost = (state == State::kHold || state == State::kRun) && motion_.homed() &&
+                    motion_.position() > kFalseHome;
+  if ((inputs.end_switch && pushing) || false_home_(inputs.home_switch && lost)) {
+    return {Fault::kTravelLimit, to_ml(motion_.position())};
+  }
+  return kNoFinding;
+}
+
+Finding RigCore::watch_regulation() {
+  const bool wants_more = motion_.blocked() > 0 &&
+                          setpoint_.value() - transducer_.pressure() > parameters_.deadband();
+  if (out_of_travel_(wants_more)) return {Fault::kTravelLimit, to_ml(motion_.position())};
+  return leak_monitor_.tick(setpoint_.resting(), motion_.position(), parameters_.leak_volume());
+}
+
+Finding RigCore::watch_host() {
+  if (!safety_.needs_host() && !jogging()) {
+    host_silent_ticks_ = 0;
+    return kNoFinding;
+  }
+  if (++host_silent_ticks_ <= ticks_of(parameters_.communication_timeout())) return kNoFinding;
+  return {Fault::kCommunicationLost, static_cast<float>(host_silent_ticks_) * to_seconds(kTick)};
+}
+
+// Whatever the fault: the loop ends and the valve opens at once; the plunger stops and, if it can
+// be trusted, retracts.
+void RigCore::react_to(const Finding &finding) {
+  if (finding.fault == Fault::kEmergencyStop) {
+    motion_.stop_at_once();
+    motion_.forget_home();  // without current the plunger may be moved by hand
+    outputs_.motor_enabled = false;
+    retracting_ = false;
+  }
+  if (!safety_.latch(finding)) return;
+  enter(State::kFault);
+  retracting_ = plunger_may_retract(finding.fault) && motion_.homed() && outputs_.motor_enabled;
+  if (retracting_) homing_.go_back(motion_, parameters_);
+  fault_report_ticks_ = 0;
+  send_fault();
+  send_heartbeat();
+}
+
+void RigCore::enter(State state) {
+  safety_.enter(state);
+  motion_.seek_home(false);
+  motion_.stop();
+  jog_ticks_ = 0;
+  if (state != State::kIdle && state != State::kVent) zeroing_.abandon();
+}
+
+void RigCore::act(const Inputs &inputs) {
+  switch (safety_.state()) {
+    case State::kBoot: break;
+    case State::kIdle:
+    case State::kHold: follow_jog(inputs); break;
+    case State::kHoming:
+    case State::kVent: follow_home(inputs); break;
+    case State::kRun: regulate(); break;
+    case State::kFault:
+      if (retracting_) {
+        retracting_ = homing_.tick(motion_, parameters_, inputs.home_switch) ==
+                      Homing::Progress::kWorking;
+      }
+      break;
+  }
+  outputs_.steps = outputs_.motor_enabled ? motion_.tick() : kNoSteps;
+  outputs_.valve_open = safety_.valve_open();
+}
+
+void RigCore::regulate() {
+  if (!pressure_monitor_.plausible()) {
+    motion_.stop();  // until the monitor has made up its mind
+    return;
+  }
+  setpoint_.tick(parameters_.setpoint_rate());
+  motion_.set_velocity(loop_.tick(parameters_, setpoint_, transducer_.pressure(),
+                                  motion_.position(), motion_.blocked()));
+}
+
+void RigCore::follow_home(const Inputs &inputs) {
+  switch (homing_.tick(motion_, parameters_, inputs.home_switch)) {
+    case Homing::Progress::kWorking: break;
+    case Homing::Progress::kFound: enter(State::kIdle); break;
+    case Homing::Progress::kFailed:
+      react_to({Fault::kHomingFailed, to_ml(homing_.travelled(motion_))});
+      break;
+  }
+}
+
+void RigCore::follow_jog(const Inputs &inputs) {
+  if (!jogging()) return;
+  --jog_ticks_;
+  if (!jogging()) motion_.stop();
+  if (inputs.home_switch && motion_.velocity() < Flow{}) {
+    motion_.stop_at_once();
+    jog_ticks_ = 0;
+  }
+}
+
+// --- commands ----------------------------------------------------------------------------------
+
+void RigCore::receive(uint8_t byte) {
+  CanFrame frame;
+  if (link_.receive(byte, frame)) handle(frame);
+}
+
+void RigCore::handle(const CanFrame &frame) {
+  switch (frame.id) {
+    case RIG_HOST_HEARTBEAT_FRAME_ID:
+      if (unpack_protocol_version(frame) == kProtocolVersion) host_silent_ticks_ = 0;
+      break;
+    case RIG_COMMAND_FRAME_ID: handle(unpack_command(frame)); break;
+    case RIG_PARAMETER_REQUEST_FRAME_ID: handle(unpack_parameter_request(frame)); break;
+    case RIG_IDENTITY_REQUEST_FRAME_ID:
+      link_.send(pack(IdentityReport{board_.kind, board_.firmware_git}));
+      break;
+    default: break;
+  }
+}
+
+// The same number again is acknowledged again and not repeated.
+void RigCore::handle(const Command &command) {
+  if (command.number == 0) return;
+  if (command.number != command_number_) {
+    command_number_ = command.number;
+    command_result_ = execute(command);
+  }
+  send_heartbeat();
+}
+
+CommandResult RigCore::execute(const Command &command) {
+  const CommandResult allowed = permitted(command.opcode, safety_.state());
+  if (allowed != CommandResult::kAccepted) return allowed;
+  switch (command.opcode) {
+    case Opcode::kNone: break;
+    case Opcode::kSetPressure: return set_pressure(command.argument);
+    case Opcode::kHold: enter(State::kHold); break;
+    case Opcode::kVent:
+      if (safety_.state() == State::kVent) break;
+      enter(State::kVent);
+      outputs_.motor_enabled = true;
+      homing_.go_back(motion_, parameters_);
+      break;
+    case Opcode::kZeroPressure:
+      zeroed_ = false;
+      zeroing_.begin();
+      break;
+    case Opcode::kTare: load_cell_.begin_tare(); break;
+    case Opcode::kHome:
+      enter(State::kHoming);
+      outputs_.motor_enabled = true;
+      homing_.search(motion_, parameters_);
+      break;
+    case Opcode::kJog: return jog(command.argument);
+    case Opcode::kClearFault: return clear_fault();
+    case Opcode::kIdle: enter(State::kIdle); break;
+  }
+  return CommandResult::kAccepted;
+}
+
+CommandResult RigCore::set_pressure(float target_kpa) {
+  if (!is_finite(target_kpa)) return CommandResult::kNotFinite;
+  const Pressure target = kpa(target_kpa);
+  if (target < Pressure{} || target >= parameters_.pressure_limit()) {
+    return CommandResult::kOutOfRange;
+  }
+  if (!motion_.homed()) return CommandResult::kNotHomed;
+  if (zeroing_.active()) return CommandResult::kBusy;
+  if (safety_.state() != State::kRun) {
+    enter(State::kRun);
+    loop_.reset();
+    leak_monitor_.reset();
+    out_of_travel_.reset();
+    setpoint_.start_from(transducer_.pressure());
+  }
+  setpoint_.set_target(target);
+  return CommandResult::kAccepted;
+}
+
+CommandResult RigCore::jog(float flow_ml_s) {
+  if (!is_finite(flow_ml_s)) return CommandResult::kNotFinite;
+  const Flow flow = ml_s(flow_ml_s);
+  if (magnitude(flow) > parameters_.max_flow()) return CommandResult::kOutOfRange;
+  if (zeroing_.active()) return CommandResult::kBusy;
+  outputs_.motor_enabled = true;
+  motion_.set_velocity(flow);
+  jog_ticks_ = kJogTicks;
+  return CommandResult::kAccepted;
+}
+
+CommandResult RigCore::clear_fault() {
+  if (safety_.state() != State::kFault) return CommandResult::kAccepted;
+  if (retracting_) return CommandResult::kBusy;
+  const bool cause_stands = inputs_.emergency_stop || !pressure_monitor_.plausible() ||
+                            transducer_.pressure() > parameters_.pressure_limit();
+  if (cause_stands) return CommandResult::kFaulted;
+  pressure_monitor_.reset();
+  load_cell_.forgive();
+  safety_.clear();
+  enter(State::kIdle);
+  return CommandResult::kAccepted;
+}
+
+void RigCore::handle(const ParameterRequest &request) {
+  const bool known = request.index < Parameters::kCount;
+  ParameterResult result = ParameterResult::kUnknownParameter;
+  switch (request.operation) {
+    case ParameterOperation::kRead:
+      if (known) result = ParameterResult::kAccepted;
+      break;
+    case ParameterOperation::kWrite: {
+      const bool at_rest = !safety_.needs_host() && !motion_.moving();
+      result = parameters_.set(request.index, request.value, at_rest);
+      if (result == ParameterResult::kAccepted) configure();
+      break;
+    }
+    case ParameterOperation::kSave:
+      save_asked_ = true;
+      result = ParameterResult::kAccepted;
+      break;
+  }
+  const float value = known ? parameters_.get(request.index) : 0.0f;
+  link_.send(pack(ParameterReport{result, request.number, request.index, value}));
+}
+
+bool RigCore::take_save(uint8_t *image) {
+  if (!save_asked_) return false;
+  save_asked_ = false;
+  parameters_.store(image);
+  return true;
+}
+
+// --- telemetry ---------------------------------------------------------------------------------
+
+void RigCore::load_cell_word(uint32_t word) { send_load_cell(load_cell_.accept(word)); }
+
+void RigCore::report() {
+  if (every(kSecondTicks, second_ticks_) && uptime_s_ != 0xFFFF) ++uptime_s_;
+  if (every(kPressureTicks, pressure_ticks_)) send_pressure();
+  if (every(kHeartbeatTicks, heartbeat_ticks_)) send_heartbeat();
+  if (every(kControllerTicks, controller_ticks_)) send_controller();
+  if (safety_.fault() != Fault::kNone && every(kSecondTicks, fault_report_ticks_)) send_fault();
+  if (load_cell_.silent(parameters_.hx711_timeout()) &&
+      every(kSecondTicks, timeout_report_ticks_)) {
+    send_load_cell(LoadCellStatus::kTimeout);
+  }
+}
+
+void RigCore::send_heartbeat() {
+  link_.send(pack(Heartbeat{
+      safety_.state(), safety_.fault(), command_number_, command_result_,
+      static_cast<uint8_t>(board_.reset_cause), inputs_.home_switch, inputs_.end_switch,
+      inputs_.emergency_stop, safety_.valve_open(), outputs_.motor_enabled, motion_.homed(),
+      zeroed_, load_cell_.tared(), uptime_s_}));
+}
+
+void RigCore::send_pressure() {
+  const bool running = safety_.state() == State::kRun;
+  link_.send(pack(PressureReport{
+      pressure_monitor_.plausible(), running && loop_.saturated(), transducer_.pressure(),
+      running ? setpoint_.value() : Pressure{}, motion_.position()}));
+}
+
+void RigCore::send_controller() {
+  const bool running = safety_.state() == State::kRun;
+  link_.send(pack(ControllerReport{motion_.velocity(), running ? loop_.integral() : Flow{},
+                                   transducer_.voltage()}));
+}
+
+void RigCore::send_load_cell(LoadCellStatus status) {
+  link_.send(pack(LoadCellReport{status, load_cell_.net_counts(), load_cell_.sample()}));
+}
+
+void RigCore::send_fault() {
+  const Duration age = kTick * static_cast<float>(safety_.fault_ticks());
+  link_.send(pack(FaultReport{safety_.fault(), safety_.fault_value(), age}));
+}
+
+}  // namespace rig

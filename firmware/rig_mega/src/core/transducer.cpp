@@ -1,0 +1,52 @@
+#include "transducer.h"
+
+#include "tick.h"
+
+namespace rig {
+
+namespace {
+
+constexpr float kAdcCounts = 1024;
+// An ADC rounds down: a conversion stands for the middle of its step.
+constexpr float kHalfCount = 0.5f;
+
+}  // namespace
+
+void Transducer::configure(const Parameters &parameters) {
+  gain_kpa_v_ = parameters.transducer_gain_kpa_v();
+  offset_ = parameters.transducer_offset();
+  volts_per_count_ = to_volts(parameters.adc_reference()) / kAdcCounts;
+}
+
+void Transducer::sample(uint32_t sum, uint8_t count) {
+  if (count != 0) {
+    const float mean = static_cast<float>(sum) / static_cast<float>(count);
+    tick_ = volts((mean + kHalfCount) * volts_per_count_);
+  }
+  if (!filled_ && count != 0) {
+    for (Voltage &v : recent_) v = tick_;
+    for (Voltage &v : history_) v = tick_;
+    filled_ = true;
+  }
+  recent_[next_recent_] = tick_;
+  next_recent_ = static_cast<uint8_t>((next_recent_ + 1) % kFilterTicks);
+  Voltage sum_v = {};
+  for (const Voltage &v : recent_) sum_v += v;
+  filtered_ = sum_v * (1.0f / kFilterTicks);
+  history_[next_history_] = filtered_;
+  next_history_ = static_cast<uint8_t>((next_history_ + 1) % kRateTicks);
+}
+
+PressureRate Transducer::rate() const {
+  constexpr Duration kSpan = kTick * static_cast<float>(kRateTicks - 1);
+  return kpa(gain_kpa_v_ * to_volts(filtered_ - history_[next_history_])) / kSpan;
+}
+
+bool Transducer::zero(Voltage at_ambient, Pressure limit) {
+  const Voltage shift = at_ambient - offset_;
+  if (magnitude(kpa(gain_kpa_v_ * to_volts(shift))) > limit) return false;
+  shift_ = shift;
+  return true;
+}
+
+}  // namespace rig

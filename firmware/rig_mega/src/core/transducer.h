@@ -1,0 +1,50 @@
+// The pressure transducer: oversampled 10-bit conversions to a pressure and its rate of change.
+//
+// A tick averages 16 to 19 conversions, the filter four ticks (8 ms): with 0.8 LSB of noise that
+// leaves 0.1 LSB, 13 effective bits.
+#pragma once
+
+#include <stdint.h>
+
+#include "parameters.h"
+#include "units.h"
+
+namespace rig {
+
+class Transducer {
+ public:
+  void configure(const Parameters &parameters);
+
+  // Takes the conversions of one tick; none at all keeps the last value.
+  void sample(uint32_t sum, uint8_t count);
+
+  Voltage tick_voltage() const { return tick_; }   // mean of this tick
+  Voltage voltage() const { return filtered_; }    // mean of the filter
+  Pressure tick_pressure() const { return pressure_of(tick_); }
+  Pressure pressure() const { return pressure_of(filtered_); }
+  PressureRate rate() const;
+
+  // Moves the zero so that `at_ambient` reads 0 kPa; false if that is more than `limit` away.
+  bool zero(Voltage at_ambient, Pressure limit);
+  Pressure pressure_of(Voltage voltage) const {
+    return kpa(gain_kpa_v_ * to_volts(voltage - offset_ - shift_));
+  }
+
+ private:
+  static constexpr uint8_t kFilterTicks = 4;
+  static constexpr uint8_t kRateTicks = 8;
+
+  float gain_kpa_v_ = 1;
+  float volts_per_count_ = 0;
+  Voltage offset_ = {};
+  Voltage shift_ = {};
+  Voltage tick_ = {};
+  Voltage filtered_ = {};
+  Voltage recent_[kFilterTicks] = {};
+  Voltage history_[kRateTicks] = {};  // filtered values, oldest at next_history_
+  uint8_t next_recent_ = 0;
+  uint8_t next_history_ = 0;
+  bool filled_ = false;
+};
+
+}  // namespace rig

@@ -1,0 +1,67 @@
+// Quantities as types, so that a pressure cannot be passed where a volume is meant.
+// Each holds one float in the unit of the field; the unit is named wherever a bare number enters
+// or leaves (RespiraWorks' units.h is the model).
+#pragma once
+
+namespace rig {
+
+template <typename Tag>
+struct Quantity {
+  float value;
+
+  friend constexpr Quantity operator+(Quantity a, Quantity b) { return {a.value + b.value}; }
+  friend constexpr Quantity operator-(Quantity a, Quantity b) { return {a.value - b.value}; }
+  friend constexpr Quantity operator-(Quantity a) { return {-a.value}; }
+  friend constexpr Quantity operator*(Quantity a, float k) { return {a.value * k}; }
+  friend constexpr Quantity operator/(Quantity a, float k) { return {a.value / k}; }
+  friend constexpr float operator/(Quantity a, Quantity b) { return a.value / b.value; }
+  friend constexpr bool operator<(Quantity a, Quantity b) { return a.value < b.value; }
+  friend constexpr bool operator>(Quantity a, Quantity b) { return a.value > b.value; }
+  friend constexpr bool operator<=(Quantity a, Quantity b) { return a.value <= b.value; }
+  friend constexpr bool operator>=(Quantity a, Quantity b) { return a.value >= b.value; }
+  Quantity &operator+=(Quantity b) {
+    value += b.value;
+    return *this;
+  }
+};
+
+using Pressure = Quantity<struct PressureTag>;
+using PressureRate = Quantity<struct PressureRateTag>;
+using Volume = Quantity<struct VolumeTag>;
+using Flow = Quantity<struct FlowTag>;
+using FlowAcceleration = Quantity<struct FlowAccelerationTag>;
+using Voltage = Quantity<struct VoltageTag>;
+using Duration = Quantity<struct DurationTag>;
+
+constexpr Pressure kpa(float v) { return {v}; }
+constexpr PressureRate kpa_s(float v) { return {v}; }
+constexpr Volume ml(float v) { return {v}; }
+constexpr Flow ml_s(float v) { return {v}; }
+constexpr FlowAcceleration ml_s2(float v) { return {v}; }
+constexpr Voltage volts(float v) { return {v}; }
+constexpr Duration seconds(float v) { return {v}; }
+
+constexpr float to_kpa(Pressure p) { return p.value; }
+constexpr float to_kpa_s(PressureRate r) { return r.value; }
+constexpr float to_ml(Volume v) { return v.value; }
+constexpr float to_ml_s(Flow q) { return q.value; }
+constexpr float to_volts(Voltage u) { return u.value; }
+constexpr float to_seconds(Duration t) { return t.value; }
+
+constexpr Volume operator*(Flow q, Duration t) { return ml(q.value * t.value); }
+constexpr Flow operator*(FlowAcceleration a, Duration t) { return ml_s(a.value * t.value); }
+constexpr Flow operator/(Volume v, Duration t) { return ml_s(v.value / t.value); }
+constexpr Pressure operator*(PressureRate r, Duration t) { return kpa(r.value * t.value); }
+constexpr PressureRate operator/(Pressure p, Duration t) { return kpa_s(p.value / t.value); }
+
+template <typename Q>
+constexpr Q clamp(Q x, Q low, Q high) {
+  return x < low ? low : (x > high ? high : x);
+}
+
+template <typename Q>
+constexpr Q magnitude(Q x) {
+  return x < Q{} ? -x : x;
+}
+
+}  // namespace rig
