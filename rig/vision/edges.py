@@ -1,0 +1,277 @@
+"""Long straight edges of a rigid part, to a fraction of a pixel.
+
+First the outline is split into straight runs, then each run is refined on the image itself:
+colour profiles across it are projected on the local difference between part and surroundings,
+and the half-way crossing is the edge. Half-way crossings are unbiased by symmetric blur, and the
+local projection follows a light gradient and a change of surroundings along the edge.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.vision.lines import FloatArray, fit_line, plain_line
+from rig.vision.segment import BluePart, Image
+from rig.vision.tone import to_light
+
+RUN_TOLERANCE_PX = 2.0  # outline pixels are quantised, jagged by noise, bent by the lens
+MIN_RUN_PX = 8.0
+MAX_RUNS = 3  # both long sides of a rectangle, and what may contradict them
+MAX_GAP_PX = 6.0
+MAX_OUTLINE_POINTS = 160
+CHORD_STARTS = 40
+CONTESTANTS = 12
+CHORD_SPANS = (0.1, 0.2, 0.35)  # of the outline; a thin rectangle's long side is almost half
+END_TRIM = 0.06  # of the run at each end: corners are rounded by blur
+MIN_TRIM_PX = 2.0
+REACH_OUT_PX = 6.0  # outer half of a profile: beyond the blur of a usable frame
+REACH_IN_PX = 4.0  # inner half: the part's colour next to the edge, not of its next face
+STEP_PX = 0.5
+PLATEAU_PX = 1.5  # length of the profile ends that define the two colours
+COLOUR_WINDOW = 9  # edge points over which those colours are averaged
+MIN_CONTRAST = 20.0  # grey levels between part and surroundings
+MIN_POINTS = 8
+PIXEL_FLOOR_PX = 0.03  # end-to-end error left by sampling and JPEG, seen on synthetic edges
+WIDTH_10_90 = 2.563  # sigmas of a blurred step between 10 % and 90 %
+
+
+@dataclass(frozen=True)
+class Edge:
+    """One straight edge of a part."""
+
+    start: FloatArray  # (2,) px in the distorted image, the end of the fitted stretch
+    end: FloatArray
+    ideal: FloatArray  # (2, 2) the same ends in undistorted pixels
+    u_rad: float  # standard uncertainty of the direction: scatter and pixel floor
+    rms_px: float
+    width_px: float  # 10 % to 90 % width of the transition
+    contrast: float  # grey levels
+    length_px: float
+    points: int
+
+    @property
+    def direction(self) -> FloatArray:
+        """Unit vector along the edge in undistorted pixels."""
+        along: FloatArray = self.ideal[1] - self.ideal[0]
+        return along / float(np.hypot(*along))
+
+
+def long_edges(
+    image: Image, part: BluePart, undistort: Callable[[FloatArray], FloatArray]
+) -> list[Edge]:
+    """Refined straight edges of `part`, longest run first.
+
+    `undistort` maps distorted to ideal pixels (n, 2); lines are fitted in ideal pixels, where
+    straight edges are straight.
+    """
+    runs = straight_runs(part.outline, image.shape[1], image.shape[0])
+    edges = (_refine(image, part, run, undistort) for run in runs)
+    return [edge for edge in edges if edge is not None]
+
+
+def straight_runs(outline: FloatArray, width: int, height: int) -> list[FloatArray]:
+    """Longest straight stretches of a closed pixel outline (n, 2), at most `MAX_RUNS`.
+
+    Consensus in the manner of RANSAC, but with every chord of a few spans as hypothesis instead
+    of random ones, so that the same frame always gives the same lines: the stretch with most
+    pixels near its line wins, is refitted, and leaves the rest to the next. Short gaps
+    (highlights, dents) are bridged. Runs on the frame's border are cuts, not edges.
+    """
+    thin = outline[:: max(1, -(-len(outline) // MAX_OUTLINE_POINTS))]
+    free = (
+        (thin[:, 0] > 1) & (thin[:, 1] > 1) & (thin[:, 0] < width - 2) & (thin[:, 1] < height - 2)
+    )
+    spacing = float(np.median(np.hypot(*np.diff(thin, axis=0).T))) if len(thin) > 1 else 1.0
+    gap = max(1, round(MAX_GAP_PX / max(spacing, 1e-9)))
+    centres, normals = _chords(thin)
+    runs: list[FloatArray] = []
+    while len(runs) < MAX_RUNS and len(centres):
+        run = _longest(thin, free, centres, normals, gap)
+        for _ in range(2):
+            if len(run) < 3:
+                break
+            centre, direction, _ = plain_line(thin[run], np.ones(len(run)))
+            run = _longest(thin, free, centre[None], _normal(direction)[None], gap)
+        points = thin[run]
+        if len(points) < 3 or float(np.hypot(*(points[-1] - points[0]))) < MIN_RUN_PX:
+            break
+        runs.append(points)
+        free = free.copy()
+        free[run] = False
+    return runs
+
+
+def _chords(outline: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Middle points (m, 2) and unit normals (m, 2) of chords of the outline."""
+    count = len(outline)
+    first = np.arange(0, count, max(1, count // CHORD_STARTS))
+    pairs = [(first, (first + max(2, round(count * span))) % count) for span in CHORD_SPANS]
+    start = np.concatenate([outline[a] for a, _ in pairs])
+    end = np.concatenate([outline[b] for _, b in pairs])
+    along = end - start
+    length = np.hypot(along[:, 0], along[:, 1])
+    keep = length >= 0.5 * MIN_RUN_PX
+    normals = np.stack([-along[keep, 1], along[keep, 0]], axis=1) / length[keep, None]
+    return 0.5 * (start + end)[keep], normals
+
+
+def _longest(
+    outline: FloatArray,
+    free: NDArray[np.bool_],
+    centres: FloatArray,
+    normals: FloatArray,
+    gap: int,
+) -> NDArray[np.intp]:
+    """Outline indices near one of the lines, in the stretch with most of them, in order.
+
+    A stretch may have gaps of at most `gap` points; lines are (m, 2) centres and normals.
+    """
+    count = len(outline)
+    distance = np.abs(normals @ outline.T - (centres * normals).sum(axis=1)[:, None])
+    close = (distance < RUN_TOLERANCE_PX) & free
+    if len(close) > CONTESTANTS:  # gaps can only lower the count, so few need the closer look
+        close = close[np.argsort(-close.sum(axis=1), kind="stable")[:CONTESTANTS]]
+    # the outline is closed: look at it twice round, but at no stretch longer than once
+    twice = np.concatenate([close, close], axis=1)
+    column = np.arange(2 * count)
+    seen = np.maximum.accumulate(np.where(twice, column, -1), axis=1)
+    before = np.concatenate([np.full((len(close), 1), -1), seen[:, :-1]], axis=1)
+    opens = twice & ((before < 0) | (column - before > gap + 1))
+    begin = np.maximum.accumulate(np.where(opens, column, 0), axis=1)
+    total = np.cumsum(twice, axis=1)
+    size = np.where(twice, total - np.take_along_axis(total, begin, axis=1) + 1, 0)
+    size[column - begin >= count] = 0
+    row, last = np.unravel_index(int(np.argmax(size)), size.shape)
+    if size[row, last] == 0:
+        return np.empty(0, dtype=np.intp)
+    stretch = np.arange(begin[row, last], last + 1)
+    return stretch[twice[row, stretch]] % count
+
+
+def _refine(
+    image: Image, part: BluePart, run: FloatArray, undistort: Callable[[FloatArray], FloatArray]
+) -> Edge | None:
+    centre, direction, _ = plain_line(run, np.ones(len(run)))
+    along = (run - centre) @ direction
+    low, high = float(along.min()), float(along.max())
+    trim = max(END_TRIM * (high - low), MIN_TRIM_PX)
+    stations = np.arange(low + trim, high - trim, 1.0)
+    if len(stations) < MIN_POINTS:
+        return None
+    base = centre + stations[:, None] * direction
+    outward = _normal(direction)
+    if part.contains(base + 2.0 * outward).sum() > part.contains(base - 2.0 * outward).sum():
+        outward = -outward
+    reach_in = _inner_reach(part, base, outward)
+    depths = np.arange(-reach_in, REACH_OUT_PX + 0.5 * STEP_PX, STEP_PX)
+    profile, contrast = _profiles(image, base, outward, depths)
+    crossing, found = _half_way(profile, depths)
+    good = found & (contrast > MIN_CONTRAST)
+    if int(good.sum()) < max(MIN_POINTS, len(stations) // 3):
+        return None
+    pixels = base[good] + crossing[good, None] * outward
+    fit = fit_line(undistort(pixels), contrast[good] ** 2)
+    reach = (undistort(pixels[[0, -1]]) - fit.centre) @ fit.direction
+    ideal = fit.centre + reach[:, None] * fit.direction
+    length = float(np.ptp(stations[good]))
+    return Edge(
+        start=pixels[0] - fit.offsets_px[0] * _normal(fit.direction),
+        end=pixels[-1] - fit.offsets_px[-1] * _normal(fit.direction),
+        ideal=ideal,
+        u_rad=float(np.hypot(fit.u_direction_rad, PIXEL_FLOOR_PX / length)),
+        rms_px=fit.rms_px,
+        width_px=_width(profile[good], depths, crossing[good]),
+        contrast=float(np.median(contrast[good])),
+        length_px=length,
+        points=int(good.sum()),
+    )
+
+
+def _normal(direction: FloatArray) -> FloatArray:
+    return np.array([-direction[1], direction[0]])
+
+
+def _inner_reach(part: BluePart, base: FloatArray, outward: FloatArray) -> float:
+    """How far profiles may go into the part: half of its local thickness, 2 to 4 px."""
+    depths = np.arange(1.0, 2.0 * REACH_IN_PX + 1.0)
+    grid = (base[:, None, :] - depths[None, :, None] * outward).reshape(-1, 2)
+    inside = part.contains(grid).reshape(len(base), len(depths))
+    thickness = float(np.median(np.minimum.accumulate(inside, axis=1).sum(axis=1)))
+    return float(np.clip(round(thickness) / 2.0, 2.0, REACH_IN_PX))
+
+
+def _profiles(
+    image: Image, base: FloatArray, outward: FloatArray, depths: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Share of the part's colour along normals (n, depths): one inside, zero outside.
+
+    Also the contrast (n,) in grey levels between the two ends.
+    """
+    grid = (base[:, None, :] + depths[None, :, None] * outward).astype(np.float32)
+    colour = cv2.remap(
+        image,
+        np.ascontiguousarray(grid[..., 0]),
+        np.ascontiguousarray(grid[..., 1]),
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
+    light = to_light(colour.astype(np.float64))
+    ends = int(round(PLATEAU_PX / STEP_PX)) + 1
+    inside = _smooth(light[:, :ends].mean(axis=1))
+    outside = _smooth(light[:, -ends:].mean(axis=1))
+    axis = inside - outside
+    energy = np.maximum((axis**2).sum(axis=1), 1e-9)
+    profile = np.einsum("nkc,nc->nk", light - outside[:, None, :], axis) / energy[:, None]
+    return profile, np.sqrt(energy)
+
+
+def _smooth(colours: FloatArray) -> FloatArray:
+    """Running mean along the edge (n, 3), shorter at the ends."""
+    window = np.ones(min(COLOUR_WINDOW, len(colours)))
+    count = np.convolve(np.ones(len(colours)), window, mode="same")
+    columns = [np.convolve(colours[:, c], window, mode="same") / count for c in range(3)]
+    return np.stack(columns, axis=1)
+
+
+def _half_way(profile: FloatArray, depths: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Depth (n,) of the half-way crossing closest to the run, and where there is one."""
+    level = profile - 0.5
+    falls = (level[:, :-1] >= 0.0) & (level[:, 1:] < 0.0)
+    distance = np.where(falls, np.abs(depths[:-1] + 0.5 * STEP_PX), np.inf)
+    index = np.argmin(distance, axis=1)
+    rows = np.arange(len(profile))
+    before, after = level[rows, index], level[rows, index + 1]
+    found = falls.any(axis=1)
+    share = np.where(found, before / np.where(found, before - after, 1.0), 0.0)
+    return depths[index] + share * STEP_PX, found
+
+
+def _width(profile: FloatArray, depths: FloatArray, crossing: FloatArray) -> float:
+    """10 % to 90 % width of the mean transition, from its 25 % to 75 % slope.
+
+    The quartiles are used because the plateaus of a thin part are short.
+    """
+    shift = np.median(crossing)
+    mean = np.median(profile, axis=0)
+    centre = int(np.argmin(np.abs(depths - shift)))
+    upper = _level_depth(mean, depths, centre, 0.75, -1)
+    lower = _level_depth(mean, depths, centre, 0.25, +1)
+    return WIDTH_10_90 * (lower - upper) / 1.349
+
+
+def _level_depth(
+    mean: FloatArray, depths: FloatArray, centre: int, level: float, step: int
+) -> float:
+    index = centre
+    while 0 < index < len(depths) - 1 and (mean[index] - level) * step > 0.0:
+        index += step
+    other = index - step
+    if not 0 <= other < len(depths) or mean[index] == mean[other]:
+        return float(depths[index])
+    share = (level - mean[index]) / (mean[other] - mean[index])
+    return float(depths[index] + np.clip(share, 0.0, 1.0) * (depths[other] - depths[index]))

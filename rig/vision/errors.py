@@ -1,0 +1,18 @@
+"""The error family of the vision part."""
+
+from __future__ import annotations
+
+from rig.errors import RigError
+
+
+class VisionError(RigError):
+    """An image, video or calibration that cannot be worked with at all.
+
+    A frame that can be read but not trusted is no error: it is a rejected `AngleMeasurement`.
+    """
+
+    exit_code = 5
+
+
+class UntrustedFrameError(Exception):
+    """Why a frame gives no angle; never leaves the package, it becomes a rejected measurement."""

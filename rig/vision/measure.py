@@ -1,0 +1,392 @@
+"""Bending angle of an actuator that hangs in front of a dark background.
+
+The angle is the turn from the long edges of the rigid connector to the long edges of the rigid
+end cap, in the plane of the picture: 0 when straight, growing as the tip curls to the side of the
+flat layer. A frame that cannot be trusted is rejected with a reason, never guessed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import cv2
+import numpy as np
+
+from rig.spec.calibration import CameraCalibration, RulerCalibration
+from rig.vision.edges import Edge, long_edges
+from rig.vision.errors import UntrustedFrameError, VisionError
+from rig.vision.lines import FloatArray
+from rig.vision.plane import PicturePlane, rectify
+from rig.vision.ruler import find_ruler
+from rig.vision.segment import BluePart, Image, decimate, find_blue_parts
+
+Side = Literal["left", "right"]
+
+BLEEDING_FACTOR = 1.4
+"""An edge this much wider than the best one of its part is no blurred step: the part's colour
+bleeds into the translucent body there. The edges of the rigid front face do not bleed."""
+BLEEDING_DRIFT = 0.4
+"""Drift from end to end of an edge within its extra width, as a share of it: the standard
+deviation of the difference of two uniform deviates."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """When a frame is trusted. Lengths in pixels, angles in degrees."""
+
+    dark_level: float = 40.0
+    """Grey level that the brightest hundredth of the frame must exceed."""
+    saturated_share: float = 0.5
+    """Share of white pixels (250 and more) from which the exposure is wrong."""
+    speck_share: float = 0.15
+    """Blue parts smaller than this share of the cap are specks."""
+    min_cap_px: float = 16.0
+    """Length of the cap's edge below which no direction is worth giving."""
+    min_cap_share: float = 0.25
+    """Length of the cap's edge relative to the connector's; less means a hidden cap."""
+    max_edge_width: float = 9.0
+    """10 % to 90 % width of the sharpest edge; more is a blurred frame."""
+    max_blur_share: float = 0.6
+    """Same, relative to the thickness of the cap: the two edges of a thin cap run together."""
+    parallel_deg: float = 12.0
+    """Edges within this of the best one are long edges of the same part."""
+    max_disagreement_deg: float = 4.0
+    """Two good long edges of one part further apart than this, and three times their uncertainty,
+    contradict each other."""
+    max_u_deg: float = 3.0
+    """Standard uncertainty above which an angle is no measurement."""
+    max_position_gap_deg: float = 65.0
+    """Largest gap between the angle and twice the swing of the cap: an arc's chord turns by half
+    the arc's angle; 90 deg would be as near to the opposite reading."""
+    lowest_deg: float = -30.0
+    highest_deg: float = 200.0
+
+
+@dataclass(frozen=True)
+class PartGeometry:
+    """What was used of a rigid part, distorted pixels."""
+
+    outline: FloatArray  # (n, 2)
+    edges: tuple[FloatArray, ...]  # fitted long edges, each (2, 2) from end to end
+
+
+@dataclass(frozen=True)
+class FrameGeometry:
+    """What was found in the frame, for overlays; empty where the search stopped."""
+
+    connector: PartGeometry | None = None
+    cap: PartGeometry | None = None
+    candidates: tuple[FloatArray, ...] = ()  # outlines of all blue parts
+    ruler_marks: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
+
+
+@dataclass(frozen=True)
+class AngleMeasurement:
+    """One frame's bending angle, or why there is none."""
+
+    angle_deg: float | None
+    u_deg: float
+    """Standard uncertainty, deg: edges, ruler, and the type B part of camera and ruler; 0 when
+    rejected."""
+    quality: float
+    """0 to 1, from contrast, sharpness, agreement of the edges and uncertainty; 0 if rejected."""
+    accepted: bool
+    reason: str
+    """Why the frame was rejected; empty when accepted."""
+    scale_mm_per_px: float | None
+    """At the actuator; None without a ruler."""
+    geometry: FrameGeometry
+
+
+@dataclass(frozen=True)
+class AngleMeter:
+    """Measures bending angles; one set-up, any number of frames, no memory between them.
+
+    With a `camera` calibration the lens is taken out, with a `ruler` calibration the plane of the
+    picture is taken from the ruler, which must then be in every frame unless `ruler_required` is
+    off. `bends` is the side to which the actuator curls in the picture. `unrectified_u_deg` is
+    the standard uncertainty that an unknown tilt of the picture plane adds where no ruler is
+    used (10 deg of tilt shifts angles by up to 0.4 deg, perspective by as much again).
+    """
+
+    camera: CameraCalibration | None = None
+    ruler: RulerCalibration | None = None
+    bends: Side = "left"
+    ruler_required: bool = True
+    unrectified_u_deg: float = 1.0
+    limits: Limits = Limits()
+
+    def measure(self, image_bgr: Image) -> AngleMeasurement:
+        """Bending angle in `image_bgr` (h, w, 3) uint8.
+
+        Raises VisionError for an array that is no such image, or whose size is not that of the
+        camera calibration; whatever is wrong with the picture itself is a rejection.
+        """
+        self._check(image_bgr)
+        frame = _Frame()
+        try:
+            angle, u = self._angle(image_bgr, frame)
+        except UntrustedFrameError as why:
+            return AngleMeasurement(
+                None, 0.0, 0.0, False, str(why), frame.scale_mm_per_px, frame.geometry()
+            )
+        quality = frame.quality(self.limits, u)
+        return AngleMeasurement(
+            angle, u, quality, True, "", frame.scale_mm_per_px, frame.geometry()
+        )
+
+    def _check(self, image: Image) -> None:
+        if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8 or not image.size:
+            raise VisionError(
+                f"Expected a colour image of shape (height, width, 3) with 8 bits a channel, got "
+                f"shape {image.shape} of {image.dtype}; convert it to 8-bit BGR first."
+            )
+        height, width = image.shape[:2]
+        if self.camera and (self.camera.width, self.camera.height) != (width, height):
+            raise VisionError(
+                f"The image is {width}x{height}, but the camera calibration is for "
+                f"{self.camera.width}x{self.camera.height}; use the calibration of this camera "
+                "mode, or none."
+            )
+
+    def _angle(self, image: Image, frame: _Frame) -> tuple[float, float]:
+        """Angle and standard uncertainty in deg; notes in `frame` what it finds on the way."""
+        small, factor = decimate(image)
+        self._check_exposure(small)
+        parts = find_blue_parts(image, small, factor)
+        frame.parts = parts
+        connector, cap = self._choose(parts)
+        plane = self._plane(image, frame)
+        frame.scale_mm_per_px = plane.scale_mm_per_px(0.5 * (connector.centroid + cap.centroid))
+
+        connector_edges = long_edges(image, connector, plane.undistort)
+        cap_edges = long_edges(image, cap, plane.undistort)
+        self._check_sharpness(connector_edges, cap_edges, cap)
+        sharpest = min(edge.width_px for edge in [*connector_edges, *cap_edges])
+        base = self._part_direction(connector_edges, sharpest, "connector")
+        tip = self._part_direction(cap_edges, sharpest, "end cap")
+        frame.connector, frame.cap = base, tip
+        self._check_cap_length(base, tip)
+
+        turn = np.degrees(plane.turn(base.ideal, tip.ideal))
+        swing = self._swing(base, tip, plane)
+        angle = swing + (turn * self._sign - swing + 90.0) % 180.0 - 90.0
+        self._check_range(angle, swing)
+        u = float(
+            np.sqrt(
+                np.degrees(base.u_rad) ** 2
+                + np.degrees(tip.u_rad) ** 2
+                + np.degrees(plane.u_turn(base.ideal, tip.ideal)) ** 2
+                + (self.camera.angle_u_deg if self.camera else 0.0) ** 2
+                + (self.unrectified_u_deg if plane.rectification is None else 0.0) ** 2
+            )
+        )
+        if u > self.limits.max_u_deg:
+            raise UntrustedFrameError(f"the angle would be uncertain by {u:.1f} deg")
+        return float(angle), u
+
+    @property
+    def _sign(self) -> float:
+        # Curling left turns the cap clockwise to the eye, which is positive in pixel axes.
+        return 1.0 if self.bends == "left" else -1.0
+
+    def _check_exposure(self, small: Image) -> None:
+        blue, green, red = cv2.split(small)
+        brightest, dimmest = cv2.max(cv2.max(blue, green), red), cv2.min(cv2.min(blue, green), red)
+        if (brightest >= self.limits.dark_level).mean() < 0.01:
+            raise UntrustedFrameError("the frame is too dark: no light, or the lens is covered")
+        if (dimmest >= 250).mean() > self.limits.saturated_share:
+            raise UntrustedFrameError("the frame is overexposed: most of it is white")
+
+    def _choose(self, parts: list[BluePart]) -> tuple[BluePart, BluePart]:
+        """The fixed connector, the largest part, and the only other one, the end cap."""
+        if not parts:
+            raise UntrustedFrameError("no actuator: no blue rigid part in the frame")
+        connector, *others = parts
+        others = [
+            part for part in others if part.area_px > self.limits.speck_share * others[0].area_px
+        ]
+        if not others:
+            raise UntrustedFrameError(
+                "only one blue part: connector or end cap is missing or hidden"
+            )
+        if len(others) > 1:
+            raise UntrustedFrameError(
+                f"{len(others)} blue parts could be the end cap; it is broken up by something in "
+                "front, or another blue thing is in the frame"
+            )
+        cap = others[0]
+        if cap.centroid[1] <= connector.centroid[1]:
+            raise UntrustedFrameError(
+                "the smaller blue part is above the larger one: the connector must be on top"
+            )
+        if cap.touches_border:
+            raise UntrustedFrameError("the end cap is cut by the border of the frame")
+        return connector, cap
+
+    def _plane(self, image: Image, frame: _Frame) -> PicturePlane:
+        if self.ruler is None:
+            return PicturePlane(self.camera)
+        try:
+            marks = find_ruler(image, self.ruler.marks)
+            frame.ruler_marks = marks.pixels
+            return rectify(self.camera, self.ruler, marks)
+        except UntrustedFrameError:
+            if self.ruler_required:
+                raise
+            return PicturePlane(self.camera)
+
+    def _check_sharpness(self, base: list[Edge], tip: list[Edge], cap: BluePart) -> None:
+        if not base:
+            raise UntrustedFrameError("the connector has no straight edge: blurred or hidden")
+        if not tip:
+            raise UntrustedFrameError("the end cap has no straight edge: blurred or hidden")
+        width = min(edge.width_px for edge in tip)
+        thickness = cap.area_px / max(edge.length_px for edge in tip)
+        if width > min(self.limits.max_edge_width, self.limits.max_blur_share * thickness):
+            raise UntrustedFrameError(
+                f"too blurred: the edges of the end cap are {width:.1f} px wide; focus the camera "
+                "or shorten its exposure"
+            )
+
+    def _part_direction(self, edges: list[Edge], sharpest: float, name: str) -> _PartDirection:
+        """Direction of a part from its long edges, weighted by their uncertainty."""
+        u = np.array([_edge_u(edge, sharpest) for edge in edges])
+        lengths = np.array([edge.length_px for edge in edges])
+        best = int(np.argmin(u))
+        lead = edges[best].direction
+        apart = np.array([_signed_turn(lead, edge.direction) for edge in edges])
+        limit = np.radians(self.limits.parallel_deg)
+        across = (np.abs(apart) > limit) & (lengths > 1.25 * lengths[best]) & (u < 3.0 * u[best])
+        if across.any():
+            raise UntrustedFrameError(
+                f"the outline of the {name} is no rectangle: something is in front of it"
+            )
+        widths = np.array([edge.width_px for edge in edges])
+        sharp = widths <= max(BLEEDING_FACTOR * widths[best], widths[best] + 1.0)
+        chosen = np.flatnonzero((np.abs(apart) <= limit) & sharp)
+        weight = 1.0 / u[chosen] ** 2
+        mean = float(weight @ apart[chosen] / weight.sum())
+        u_mean = float(1.0 / np.sqrt(weight.sum()))
+        gaps = np.abs(apart[chosen] - apart[best])
+        allowed = 3.0 * np.hypot(u[chosen], u[best])
+        if (gaps > np.maximum(allowed, np.radians(self.limits.max_disagreement_deg))).any():
+            raise UntrustedFrameError(
+                f"the long edges of the {name} disagree by {np.degrees(gaps.max()):.1f} deg"
+            )
+        if len(chosen) > 1:  # Birge: edges that scatter more than they claim widen the result
+            chi2 = float(weight @ (apart[chosen] - mean) ** 2) / (len(chosen) - 1)
+            u_mean *= max(1.0, np.sqrt(chi2))
+        used = [edges[i] for i in chosen]
+        centre = np.mean([edge.ideal.mean(axis=0) for edge in used], axis=0)
+        turned = np.array([[np.cos(mean), -np.sin(mean)], [np.sin(mean), np.cos(mean)]]) @ lead
+        half = 0.5 * float(lengths[best])
+        return _PartDirection(
+            ideal=np.array([centre - half * turned, centre + half * turned]),
+            u_rad=u_mean,
+            edges=used,
+            spread_rad=float(gaps.max()),
+        )
+
+    def _check_cap_length(self, base: _PartDirection, tip: _PartDirection) -> None:
+        length, reference = tip.length_px, base.length_px
+        if length < self.limits.min_cap_px or length < self.limits.min_cap_share * reference:
+            raise UntrustedFrameError(
+                f"the end cap is too short to trust ({length:.0f} px): partly hidden?"
+            )
+
+    def _swing(self, base: _PartDirection, tip: _PartDirection, plane: PicturePlane) -> float:
+        """Twice the angle in deg between the hanging axis and the chord to the cap.
+
+        An arc of angle a has a chord turned by a / 2, so this is the bending angle as the cap's
+        position tells it: crude, but enough to know on which half turn the cap's edge is.
+        """
+        axis = np.array([-(base.ideal[1] - base.ideal[0])[1], (base.ideal[1] - base.ideal[0])[0]])
+        if axis[1] < 0.0:  # the actuator hangs: its axis points down the picture
+            axis = -axis
+        chord = tip.ideal.mean(axis=0) - base.ideal.mean(axis=0)
+        half = np.arctan2(axis[0] * chord[1] - axis[1] * chord[0], float(axis @ chord))
+        return self._sign * 2.0 * float(np.degrees(half))
+
+    def _check_range(self, angle: float, swing: float) -> None:
+        if abs(angle - swing) > self.limits.max_position_gap_deg:
+            raise UntrustedFrameError(
+                f"the cap's edge tells {angle:.0f} deg, but its position about {swing:.0f} deg"
+            )
+        if angle < self.limits.lowest_deg:
+            other = "right" if self.bends == "left" else "left"
+            raise UntrustedFrameError(
+                f"the tip curls to the {other} by {-angle:.0f} deg, but is expected to curl to "
+                f"the {self.bends}"
+            )
+        if angle > self.limits.highest_deg:
+            raise UntrustedFrameError(f"a bending angle of {angle:.0f} deg is not plausible")
+
+
+@dataclass(frozen=True)
+class _PartDirection:
+    """A rigid part's direction as a segment (2, 2) in ideal pixels, and how well it is known."""
+
+    ideal: FloatArray
+    u_rad: float
+    edges: list[Edge]
+    spread_rad: float
+
+    @property
+    def length_px(self) -> float:
+        return max(edge.length_px for edge in self.edges)
+
+
+@dataclass
+class _Frame:
+    """What has been found so far; becomes part of the measurement wherever the search ends."""
+
+    parts: list[BluePart] = field(default_factory=list)
+    connector: _PartDirection | None = None
+    cap: _PartDirection | None = None
+    ruler_marks: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
+    scale_mm_per_px: float | None = None
+
+    def geometry(self) -> FrameGeometry:
+        outlines = tuple(part.outline for part in self.parts)
+        connector = cap = None
+        if self.connector and self.cap:
+            connector = PartGeometry(outlines[0], _segments(self.connector))
+            cap = PartGeometry(outlines[1], _segments(self.cap))
+        return FrameGeometry(connector, cap, outlines, self.ruler_marks)
+
+    def quality(self, limits: Limits, u_deg: float) -> float:
+        """Geometric mean of four scores, so that one bad score is not averaged away."""
+        assert self.connector is not None
+        assert self.cap is not None
+        edges = [*self.connector.edges, *self.cap.edges]
+        scores = np.array(
+            [
+                min(edge.contrast for edge in edges) / 60.0,
+                1.0 - min(edge.width_px for edge in edges) / limits.max_edge_width,
+                1.0 - np.degrees(self.cap.spread_rad) / (2.0 * limits.parallel_deg),
+                1.0 - u_deg / limits.max_u_deg,
+            ]
+        )
+        return float(np.prod(np.clip(scores, 0.01, 1.0)) ** 0.25)
+
+
+def _segments(part: _PartDirection) -> tuple[FloatArray, ...]:
+    return tuple(np.array([edge.start, edge.end]) for edge in part.edges)
+
+
+def _edge_u(edge: Edge, sharpest: float) -> float:
+    """Standard uncertainty of an edge's direction, rad, with what its width adds.
+
+    Where the edge is within a transition much wider than the frame's sharpest one may drift from
+    one end to the other.
+    """
+    bleeding = max(0.0, edge.width_px - BLEEDING_FACTOR * sharpest - 1.0)
+    return float(np.hypot(edge.u_rad, BLEEDING_DRIFT * bleeding / edge.length_px))
+
+
+def _signed_turn(first: FloatArray, second: FloatArray) -> float:
+    """Turn from one undirected line to another, rad in [-pi/2, pi/2)."""
+    turn = np.arctan2(first[0] * second[1] - first[1] * second[0], float(first @ second))
+    return float((turn + np.pi / 2) % np.pi - np.pi / 2)

@@ -1,0 +1,181 @@
+"""From distorted pixels to the plane of the picture: lens, then the plane of the ruler.
+
+Straight lines stay straight in ideal (undistorted) pixels and under a homography, so edges are
+fitted in ideal pixels and only their directions are taken into the plane. In-plane geometry is
+used throughout: the pose of a plane seen head-on is ambiguous, its homography is not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from rig.spec.calibration import CameraCalibration, RulerCalibration
+from rig.vision.errors import UntrustedFrameError
+from rig.vision.lines import FloatArray
+from rig.vision.ruler import RulerMarks
+
+MAX_RESIDUAL_PX = 1.0  # rms: worse marks are no plane grid, or belong to another ruler
+MARK_FLOOR_PX = 0.02  # centroid noise assumed at least
+GAUSS_NEWTON_STEPS = 4
+
+
+@dataclass(frozen=True)
+class Rectification:
+    """Homography from the ruler's plane to ideal pixels and what it is worth.
+
+    Plane coordinates are in pitches, centred on the mean of the marks.
+    """
+
+    homography: FloatArray  # (3, 3), last entry 1
+    covariance: FloatArray  # (8, 8) of the first eight entries
+    residual_px: float
+    pitch_mm: float
+    squareness_u_rad: float
+
+
+@dataclass(frozen=True)
+class PicturePlane:
+    """Maps points of a frame; without a camera no lens, without a ruler no rectification."""
+
+    camera: CameraCalibration | None
+    rectification: Rectification | None = None
+
+    def undistort(self, pixels: FloatArray) -> FloatArray:
+        """Ideal pixels (n, 2) of distorted ones (n, 2)."""
+        if self.camera is None:
+            return pixels
+        matrix = _camera_matrix(self.camera)
+        ideal = cv2.undistortPoints(
+            np.ascontiguousarray(pixels).reshape(-1, 1, 2),
+            matrix,
+            np.array(self.camera.distortion, dtype=np.float64),
+            P=matrix,
+        )
+        return np.asarray(ideal, dtype=np.float64).reshape(-1, 2)
+
+    def turn(self, first: FloatArray, second: FloatArray) -> float:
+        """Angle in rad, modulo pi, from the first to the second segment (2, 2) of ideal pixels.
+
+        Positive turns from the picture's x axis to its y axis, clockwise to the eye.
+        """
+        parameters = None
+        if self.rectification is not None:
+            parameters = self.rectification.homography.ravel()[:8]
+        return _turn(parameters, first, second)
+
+    def u_turn(self, first: FloatArray, second: FloatArray) -> float:
+        """Standard uncertainty of `turn`, rad, from marks and squareness of the ruler."""
+        plane = self.rectification
+        if plane is None:
+            return 0.0
+        base = plane.homography.ravel()[:8]
+        here = _turn(base, first, second)
+        gradient = np.empty(8)
+        for k in range(8):
+            step = 0.1 * float(np.sqrt(plane.covariance[k, k])) + 1e-15
+            shifted = base.copy()
+            shifted[k] += step
+            change = _turn(shifted, first, second) - here
+            gradient[k] = (change + np.pi / 2) % np.pi - np.pi / 2
+            gradient[k] /= step
+        marks = float(gradient @ plane.covariance @ gradient)
+        # A leg that leans by e shears the plane: directions d turn by e sin^2 d.
+        lean = np.diff([np.sin(_direction(base, s)) ** 2 for s in (first, second)])
+        return float(np.sqrt(max(marks, 0.0) + (plane.squareness_u_rad * lean[0]) ** 2))
+
+    def scale_mm_per_px(self, pixel: FloatArray) -> float | None:
+        """Size of a pixel at `pixel` (2,), mm; None without a ruler."""
+        if self.rectification is None:
+            return None
+        ideal = self.undistort(
+            pixel[None] + np.array([[-0.5, 0.0], [0.5, 0.0], [0, -0.5], [0, 0.5]])
+        )
+        places = _to_plane(self.rectification.homography.ravel()[:8], ideal)
+        along, down = places[1] - places[0], places[3] - places[2]
+        area = abs(float(along[0] * down[1] - along[1] * down[0]))
+        return self.rectification.pitch_mm * float(np.sqrt(area))
+
+
+def rectify(
+    camera: CameraCalibration | None, ruler: RulerCalibration, marks: RulerMarks
+) -> PicturePlane:
+    """The plane of the ruler from its marks; raises UntrustedFrameError if they do not fit one.
+
+    Least squares in the image, where the noise is; two legs with two marks each beside the
+    corner would be enough, the rest gives the residual.
+    """
+    lens = PicturePlane(camera)
+    pixels = lens.undistort(marks.pixels)
+    grid = marks.grid - marks.grid.mean(axis=0)
+    start = cv2.findHomography(grid, pixels, 0)[0]
+    if start is None:
+        raise UntrustedFrameError("ruler marks do not span a plane")
+    parameters = (np.asarray(start, dtype=np.float64) / start[2, 2]).ravel()[:8]
+    for _ in range(GAUSS_NEWTON_STEPS):
+        predicted, jacobian = _project(parameters, grid)
+        step = np.linalg.lstsq(jacobian, (pixels - predicted).ravel(), rcond=None)[0]
+        parameters = parameters + step
+    predicted, jacobian = _project(parameters, grid)
+    freedom = 2 * len(grid) - 8
+    misfit = float(((pixels - predicted) ** 2).sum())
+    residual = float(np.sqrt(misfit / len(grid)))
+    if not residual < MAX_RESIDUAL_PX:
+        raise UntrustedFrameError(
+            f"ruler marks miss a plane grid by {residual:.2f} px; is the ruler bent, or its "
+            "calibration or the camera's for another one?"
+        )
+    variance = max(misfit / max(freedom, 1), MARK_FLOOR_PX**2)
+    return PicturePlane(
+        camera,
+        Rectification(
+            homography=np.append(parameters, 1.0).reshape(3, 3),
+            covariance=variance * np.linalg.pinv(jacobian.T @ jacobian),
+            residual_px=residual,
+            pitch_mm=ruler.pitch * 1e3,
+            squareness_u_rad=float(np.radians(ruler.squareness_u_deg)),
+        ),
+    )
+
+
+def _camera_matrix(camera: CameraCalibration) -> FloatArray:
+    return np.array(
+        [
+            [camera.focal_x, 0.0, camera.centre_x],
+            [0.0, camera.focal_y, camera.centre_y],
+            [0.0, 0.0, 1.0],
+        ]
+    )
+
+
+def _project(parameters: FloatArray, grid: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Ideal pixels (n, 2) of plane points (n, 2), and the Jacobian (2n, 8)."""
+    x, y = grid.T
+    a, b, c, d, e, f, g, h = parameters
+    depth = g * x + h * y + 1.0
+    u, v = (a * x + b * y + c) / depth, (d * x + e * y + f) / depth
+    zero, one = np.zeros_like(x), np.ones_like(x)
+    rows_u = np.stack([x, y, one, zero, zero, zero, -u * x, -u * y], axis=1) / depth[:, None]
+    rows_v = np.stack([zero, zero, zero, x, y, one, -v * x, -v * y], axis=1) / depth[:, None]
+    jacobian = np.stack([rows_u, rows_v], axis=1).reshape(-1, 8)
+    return np.stack([u, v], axis=1), jacobian
+
+
+def _to_plane(parameters: FloatArray | None, ideal: FloatArray) -> FloatArray:
+    if parameters is None:
+        return ideal
+    inverse = np.linalg.inv(np.append(parameters, 1.0).reshape(3, 3))
+    places = np.column_stack([ideal, np.ones(len(ideal))]) @ inverse.T
+    flat: FloatArray = places[:, :2] / places[:, 2:]
+    return flat
+
+
+def _direction(parameters: FloatArray | None, segment: FloatArray) -> float:
+    start, end = _to_plane(parameters, segment)
+    return float(np.arctan2(end[1] - start[1], end[0] - start[0]))
+
+
+def _turn(parameters: FloatArray | None, first: FloatArray, second: FloatArray) -> float:
+    return (_direction(parameters, second) - _direction(parameters, first)) % np.pi

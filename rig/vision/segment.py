@@ -1,0 +1,133 @@
+"""Rigid blue parts by colour: a coarse search on a decimated frame, then a full-size outline.
+
+The rigid connector and the end cap are the only strongly blue things of the bench. Blueness is
+linear in the pixel, B - (R + G) / 2, so that blur and noise act on it as on the light itself: a
+grey background is zero at any brightness and the yellowish print is negative.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.vision.lines import FloatArray
+
+Image = NDArray[np.uint8]
+Mask = NDArray[np.uint8]
+
+BLUENESS = np.array([[1.0, -0.5, -0.5]], dtype=np.float32)  # of B, G, R
+MIN_BLUENESS = 22.0  # grey levels: well above chroma noise of dark pixels
+MIN_SATURATION = 0.2  # blueness over B: a bluish white wall or skylight glare stays out
+COARSE_WIDTH = 320  # px: the search needs no more
+MIN_AREA = 60.0  # full-size px: smaller specks are noise
+MAX_PARTS = 12
+SEARCH_MARGIN = 2  # coarse pixels around a part that its full-size outline may reach
+
+
+@dataclass(frozen=True)
+class BluePart:
+    """A connected blue region: outline (n, 2) in full-size pixels, ordered along the border."""
+
+    outline: FloatArray
+    area_px: float
+    centroid: FloatArray
+    box: tuple[int, int, int, int]  # left, top, right, bottom (exclusive)
+    mask: Mask  # (h, w) 0 or 1 inside `window`
+    window: tuple[int, int]  # left, top of the mask in the frame
+    touches_border: bool
+
+    def contains(self, points: FloatArray) -> NDArray[np.bool_]:
+        """Which of `points` (n, 2) px lie on the part."""
+        column = np.rint(points[:, 0]).astype(int) - self.window[0]
+        row = np.rint(points[:, 1]).astype(int) - self.window[1]
+        height, width = self.mask.shape
+        inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+        hit: NDArray[np.bool_] = np.zeros(len(points), dtype=np.bool_)
+        hit[inside] = self.mask[row[inside], column[inside]] > 0
+        return hit
+
+
+def decimate(image: Image) -> tuple[Image, int]:
+    """Area-averaged copy about `COARSE_WIDTH` wide, and the integer factor."""
+    height, width = image.shape[:2]
+    factor = max(1, round(max(height, width) / COARSE_WIDTH))
+    if factor == 1:
+        return image, 1
+    size = (max(width // factor, 1), max(height // factor, 1))
+    crop = image[: size[1] * factor, : size[0] * factor]
+    small: Image = cv2.resize(crop, size, interpolation=cv2.INTER_AREA)
+    return small, factor
+
+
+def find_blue_parts(image: Image, small: Image, factor: int) -> list[BluePart]:
+    """Blue parts of a BGR image, largest first; `small` is the image decimated by `factor`."""
+    coarse = _blueness(small)
+    mask = ((coarse > MIN_BLUENESS) & (coarse > MIN_SATURATION * small[..., 0])).astype(np.uint8)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
+    order = 1 + np.argsort(-stats[1:, cv2.CC_STAT_AREA], kind="stable")[:MAX_PARTS]
+    parts: list[BluePart] = []
+    for label in order if count > 1 else ():
+        if stats[label, cv2.CC_STAT_AREA] * factor**2 < MIN_AREA:
+            break
+        region = _padded(stats[label, :4], small.shape)
+        mine = labels[region] == label
+        level = float(np.median(coarse[region][mine]))
+        part = _outline(image, mine.astype(np.uint8), region, factor, level)
+        if part is not None:
+            parts.append(part)
+    return sorted(parts, key=lambda part: -part.area_px)
+
+
+def _blueness(image: Image) -> NDArray[np.float32]:
+    blueness: NDArray[np.float32] = cv2.transform(image.astype(np.float32), BLUENESS)
+    return blueness
+
+
+def _padded(box: NDArray[np.int32], shape: tuple[int, ...]) -> tuple[slice, slice]:
+    left, top, width, height = (int(v) for v in box)
+    return (
+        slice(max(top - SEARCH_MARGIN, 0), min(top + height + SEARCH_MARGIN, shape[0])),
+        slice(max(left - SEARCH_MARGIN, 0), min(left + width + SEARCH_MARGIN, shape[1])),
+    )
+
+
+def _outline(
+    image: Image, coarse: Mask, region: tuple[slice, slice], factor: int, level: float
+) -> BluePart | None:
+    """The part at full size: pixels above half its own blueness, the middle of its edges.
+
+    Only pixels near the coarse part count, so that a close neighbour is not drawn in.
+    """
+    frame_height, frame_width = image.shape[:2]
+    top, left = region[0].start * factor, region[1].start * factor
+    near = cv2.dilate(coarse, np.ones((3, 3), np.uint8), iterations=SEARCH_MARGIN)
+    near = np.repeat(np.repeat(near, factor, axis=0), factor, axis=1)
+    blueness = _blueness(image[top : top + near.shape[0], left : left + near.shape[1]])
+    mask = ((blueness > max(0.5 * level, MIN_BLUENESS)) & (near > 0)).astype(np.uint8)
+    contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    if not contours:
+        return None
+    contour = max(contours, key=cv2.contourArea)
+    area = float(cv2.contourArea(contour))
+    if area < MIN_AREA:
+        return None
+    points = contour[:, 0, :].astype(np.float64)
+    body = np.zeros_like(mask)
+    cv2.drawContours(body, [contour], -1, 1, thickness=cv2.FILLED)
+    outline = points + (left, top)
+    low, high = outline.min(axis=0), outline.max(axis=0)
+    moments = cv2.moments(contour)
+    return BluePart(
+        outline=outline,
+        area_px=area,
+        centroid=np.array([moments["m10"], moments["m01"]]) / moments["m00"] + (left, top),
+        box=(int(low[0]), int(low[1]), int(high[0]) + 1, int(high[1]) + 1),
+        mask=body,
+        window=(left, top),
+        touches_border=bool(
+            low[0] <= 1 or low[1] <= 1 or high[0] >= frame_width - 2 or high[1] >= frame_height - 2
+        ),
+    )
