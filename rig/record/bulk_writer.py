@@ -57,11 +57,12 @@ class _OpenChunk:
 
 
 class BulkWriter:
-    """An MCAP file in the making on `stream`, a binary file open for writing at its end."""
+    """An MCAP file in the making on `stream`, a new binary file."""
 
     def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream
-        self._position = stream.tell()
+        self._position = 0
+        self._data_crc = 0
         self._compressor = zstandard.ZstdCompressor(level=3)
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
@@ -76,11 +77,12 @@ class BulkWriter:
         """Write magic and header of a new file."""
         self._write(MAGIC + encode(Header("", library)))
 
-    def continue_from(self, found: Scan, keep_chunks: int) -> None:
-        """Take over the state of an existing file of which the first chunks are kept.
+    def continue_from(self, found: Scan, keep_chunks: int, kept_bytes: bytes) -> None:
+        """Take over an existing file of which the first chunks, `kept_bytes`, are kept.
 
-        The stream must hold exactly the kept bytes; message indexes that were cut off are added.
+        Message indexes that were cut off are added.
         """
+        self._write(kept_bytes)
         kept = found.chunks[:keep_chunks]
         end = self._position
         self._channels = {
@@ -231,7 +233,7 @@ class BulkWriter:
     def finish(self) -> None:
         """Write summary and end of the file; the stream stays open."""
         self.flush()
-        self._write(encode(DataEnd(0)))
+        self._write(encode(DataEnd(self._data_crc)))
         start = self._position
         groups: list[tuple[int, list[bytes]]] = [
             (Opcode.SCHEMA, [encode(schema) for schema in self._schemas.values()]),
@@ -312,6 +314,7 @@ class BulkWriter:
         except OSError as error:
             raise _unwritable(self._stream, error) from error
         self._position += len(data)
+        self._data_crc = zlib.crc32(data, self._data_crc)
 
 
 def _unwritable(stream: BinaryIO, error: OSError) -> RecordError:

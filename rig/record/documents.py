@@ -15,9 +15,9 @@ ExitStatus = Literal["success", "aborted", "failed"]
 
 
 class Document(BaseModel):
-    """A frozen record that survives a round trip through JSON."""
+    """A frozen record that survives a round trip through JSON, which knows no NaN."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class StartDocument(Document):

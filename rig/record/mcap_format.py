@@ -26,6 +26,7 @@ from mcap.records import (
     Channel,
     Chunk,
     ChunkIndex,
+    DataEnd,
     McapRecord,
     Metadata,
     MetadataIndex,
@@ -234,7 +235,8 @@ def _take(found: Scan, log: memoryview, opcode: int, position: int, following: i
     elif opcode == Opcode.CHANNEL:
         channel = decode(Channel, body)
         found.channels[channel.id] = channel
-        found.definition_ends[channel.id] = following
+        # The summary repeats definitions; the first one is the one that counts.
+        found.definition_ends.setdefault(channel.id, following)
     elif opcode == Opcode.CHUNK:
         _take_chunk(found, body, position, following)
     elif opcode == Opcode.MESSAGE_INDEX:
@@ -245,6 +247,10 @@ def _take(found: Scan, log: memoryview, opcode: int, position: int, following: i
         metadata = decode(Metadata, body)
         index = MetadataIndex(position, following - position, metadata.name)
         found.metadata.append(MetadataEntry(index, metadata))
+    elif opcode == Opcode.DATA_END:
+        stated = decode(DataEnd, body).data_section_crc
+        if stated and zlib.crc32(log[:position]) != stated:
+            raise ValueError("the checksum of the whole log does not match: something is damaged")
     elif opcode == Opcode.FOOTER:
         if bytes(log[following : following + len(MAGIC)]) != MAGIC:
             raise ValueError("the closing magic is missing")

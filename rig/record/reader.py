@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.Log_pb2 import Log
+from google.protobuf.message import DecodeError
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
@@ -154,7 +155,7 @@ class RunReader:
                 image = CompressedImage.FromString(data)
                 frame = int(note.pop("frame"))
                 key = PointKey.model_validate(note) if note else None
-            except (ValueError, KeyError) as error:
+            except (ValueError, KeyError, TypeError, AttributeError, DecodeError) as error:
                 raise self._foreign(topic, error) from error
             yield CameraImage(key, frame, time_ns / 1e9, image.data)
 
@@ -165,7 +166,7 @@ class RunReader:
             try:
                 line = Log.FromString(data)
                 values = json.loads(line.message)
-            except ValueError as error:
+            except (ValueError, DecodeError) as error:
                 raise self._foreign(topic, error) from error
             level = LEVEL_NAMES.get(line.level, "info")
             found.append(Event(time_ns / 1e9, line.name, values, level))
@@ -190,10 +191,10 @@ class RunReader:
         if channel is None:
             return {"time_s": np.empty(0)}
         times_ns, payloads = self._bulk(topic)
-        schema = json.loads(self._found.schemas[channel.schema_id].data)
         try:
+            schema = json.loads(self._found.schemas[channel.schema_id].data)
             table = columns(payloads, schema["properties"])
-        except ValueError as error:
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise self._foreign(topic, error) from error
         return {"time_s": np.array(times_ns, dtype=np.float64) / 1e9} | table
 

@@ -172,9 +172,8 @@ class RunWriter:
         partial = path.with_suffix(".mcap.partial")
         try:
             stream = partial.open("wb")
-            stream.write(content[:end])
             log = BulkWriter(stream)
-            log.continue_from(found, keep_chunks)
+            log.continue_from(found, keep_chunks, content[:end])
             log.sync()
             if _drops_data(found, end):
                 os.link(path, _free_name(folder))
