@@ -92,9 +92,7 @@ def straight_runs(outline: FloatArray, width: int, height: int) -> list[FloatArr
     runs: list[FloatArray] = []
     while len(runs) < MAX_RUNS and len(centres):
         run = _longest(thin, free, centres, normals, gap)
-        for _ in range(2):
-            if len(run) < 3:
-                break
+        if len(run) >= 3:
             centre, direction, _ = plain_line(thin[run], np.ones(len(run)))
             run = _longest(thin, free, centre[None], _normal(direction)[None], gap)
         points = thin[run]
@@ -150,7 +148,8 @@ def _longest(
     if size[row, last] == 0:
         return np.empty(0, dtype=np.intp)
     stretch = np.arange(begin[row, last], last + 1)
-    return stretch[twice[row, stretch]] % count
+    members: NDArray[np.intp] = stretch[twice[row, stretch]] % count
+    return members
 
 
 def _refine(
@@ -221,7 +220,7 @@ def _profiles(
         borderMode=cv2.BORDER_REPLICATE,
     )
     light = to_light(colour.astype(np.float64))
-    ends = int(round(PLATEAU_PX / STEP_PX)) + 1
+    ends = round(PLATEAU_PX / STEP_PX) + 1
     inside = _smooth(light[:, :ends].mean(axis=1))
     outside = _smooth(light[:, -ends:].mean(axis=1))
     axis = inside - outside
@@ -231,11 +230,10 @@ def _profiles(
 
 
 def _smooth(colours: FloatArray) -> FloatArray:
-    """Running mean along the edge (n, 3), shorter at the ends."""
-    window = np.ones(min(COLOUR_WINDOW, len(colours)))
-    count = np.convolve(np.ones(len(colours)), window, mode="same")
-    columns = [np.convolve(colours[:, c], window, mode="same") / count for c in range(3)]
-    return np.stack(columns, axis=1)
+    """Running mean along the edge (n, 3)."""
+    column = np.ascontiguousarray(colours)[:, None, :]
+    mean = cv2.blur(column, (1, COLOUR_WINDOW), borderType=cv2.BORDER_REPLICATE)
+    return np.asarray(mean, dtype=np.float64).reshape(-1, 3)
 
 
 def _half_way(profile: FloatArray, depths: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
@@ -246,7 +244,7 @@ def _half_way(profile: FloatArray, depths: FloatArray) -> tuple[FloatArray, NDAr
     index = np.argmin(distance, axis=1)
     rows = np.arange(len(profile))
     before, after = level[rows, index], level[rows, index + 1]
-    found = falls.any(axis=1)
+    found: NDArray[np.bool_] = np.any(falls, axis=1).astype(np.bool_)
     share = np.where(found, before / np.where(found, before - after, 1.0), 0.0)
     return depths[index] + share * STEP_PX, found
 
@@ -257,7 +255,7 @@ def _width(profile: FloatArray, depths: FloatArray, crossing: FloatArray) -> flo
     The quartiles are used because the plateaus of a thin part are short.
     """
     shift = np.median(crossing)
-    mean = np.median(profile, axis=0)
+    mean = profile.mean(axis=0)
     centre = int(np.argmin(np.abs(depths - shift)))
     upper = _level_depth(mean, depths, centre, 0.75, -1)
     lower = _level_depth(mean, depths, centre, 0.25, +1)

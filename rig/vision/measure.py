@@ -19,13 +19,15 @@ from rig.vision.errors import UntrustedFrameError, VisionError
 from rig.vision.lines import FloatArray
 from rig.vision.plane import PicturePlane, rectify
 from rig.vision.ruler import find_ruler
-from rig.vision.segment import BluePart, Image, decimate, find_blue_parts
+from rig.vision.segment import BluePart, Image, find_blue_parts, pyramid
 
 Side = Literal["left", "right"]
 
 BLEEDING_FACTOR = 1.4
 """An edge this much wider than the best one of its part is no blurred step: the part's colour
 bleeds into the translucent body there. The edges of the rigid front face do not bleed."""
+LONG_SHARE = 0.4
+"""Edges shorter than this share of a part's best one are fragments, not its long edges."""
 BLEEDING_DRIFT = 0.4
 """Drift from end to end of an edge within its extra width, as a share of it: the standard
 deviation of the difference of two uniform deviates."""
@@ -152,12 +154,12 @@ class AngleMeter:
 
     def _angle(self, image: Image, frame: _Frame) -> tuple[float, float]:
         """Angle and standard uncertainty in deg; notes in `frame` what it finds on the way."""
-        small, factor = decimate(image)
-        self._check_exposure(small)
-        parts = find_blue_parts(image, small, factor)
+        levels = pyramid(image)
+        self._check_exposure(levels[-1])
+        parts = find_blue_parts(levels)
         frame.parts = parts
         connector, cap = self._choose(parts)
-        plane = self._plane(image, frame)
+        plane = self._plane(levels, frame)
         frame.scale_mm_per_px = plane.scale_mm_per_px(0.5 * (connector.centroid + cap.centroid))
 
         connector_edges = long_edges(image, connector, plane.undistort)
@@ -170,7 +172,7 @@ class AngleMeter:
         self._check_cap_length(base, tip)
 
         turn = np.degrees(plane.turn(base.ideal, tip.ideal))
-        swing = self._swing(base, tip, plane)
+        swing = self._swing(base, tip)
         angle = swing + (turn * self._sign - swing + 90.0) % 180.0 - 90.0
         self._check_range(angle, swing)
         u = float(
@@ -225,11 +227,11 @@ class AngleMeter:
             raise UntrustedFrameError("the end cap is cut by the border of the frame")
         return connector, cap
 
-    def _plane(self, image: Image, frame: _Frame) -> PicturePlane:
+    def _plane(self, levels: list[Image], frame: _Frame) -> PicturePlane:
         if self.ruler is None:
             return PicturePlane(self.camera)
         try:
-            marks = find_ruler(image, self.ruler.marks)
+            marks = find_ruler(levels, self.ruler.marks)
             frame.ruler_marks = marks.pixels
             return rectify(self.camera, self.ruler, marks)
         except UntrustedFrameError:
@@ -265,7 +267,8 @@ class AngleMeter:
             )
         widths = np.array([edge.width_px for edge in edges])
         sharp = widths <= max(BLEEDING_FACTOR * widths[best], widths[best] + 1.0)
-        chosen = np.flatnonzero((np.abs(apart) <= limit) & sharp)
+        long = lengths >= LONG_SHARE * lengths[best]
+        chosen = np.flatnonzero((np.abs(apart) <= limit) & sharp & long)
         weight = 1.0 / u[chosen] ** 2
         mean = float(weight @ apart[chosen] / weight.sum())
         u_mean = float(1.0 / np.sqrt(weight.sum()))
@@ -296,7 +299,7 @@ class AngleMeter:
                 f"the end cap is too short to trust ({length:.0f} px): partly hidden?"
             )
 
-    def _swing(self, base: _PartDirection, tip: _PartDirection, plane: PicturePlane) -> float:
+    def _swing(self, base: _PartDirection, tip: _PartDirection) -> float:
         """Twice the angle in deg between the hanging axis and the chord to the cap.
 
         An arc of angle a has a chord turned by a / 2, so this is the bending angle as the cap's

@@ -61,30 +61,29 @@ class PicturePlane:
 
         Positive turns from the picture's x axis to its y axis, clockwise to the eye.
         """
-        parameters = None
-        if self.rectification is not None:
-            parameters = self.rectification.homography.ravel()[:8]
-        return _turn(parameters, first, second)
+        return float(_turns(self._homographies(), first, second)[0])
 
     def u_turn(self, first: FloatArray, second: FloatArray) -> float:
         """Standard uncertainty of `turn`, rad, from marks and squareness of the ruler."""
         plane = self.rectification
         if plane is None:
             return 0.0
-        base = plane.homography.ravel()[:8]
-        here = _turn(base, first, second)
-        gradient = np.empty(8)
-        for k in range(8):
-            step = 0.1 * float(np.sqrt(plane.covariance[k, k])) + 1e-15
-            shifted = base.copy()
-            shifted[k] += step
-            change = _turn(shifted, first, second) - here
-            gradient[k] = (change + np.pi / 2) % np.pi - np.pi / 2
-            gradient[k] /= step
+        steps = 0.1 * np.sqrt(np.diag(plane.covariance)) + 1e-15
+        shifted = np.repeat(self._homographies(), 9, axis=0)
+        shifted.reshape(9, 9)[1:, :8] += np.diag(steps)
+        turns = _turns(shifted, first, second)
+        gradient = ((turns[1:] - turns[0] + np.pi / 2) % np.pi - np.pi / 2) / steps
         marks = float(gradient @ plane.covariance @ gradient)
         # A leg that leans by e shears the plane: directions d turn by e sin^2 d.
-        lean = np.diff([np.sin(_direction(base, s)) ** 2 for s in (first, second)])
-        return float(np.sqrt(max(marks, 0.0) + (plane.squareness_u_rad * lean[0]) ** 2))
+        here = self._homographies()
+        lean = np.sin(_directions(here, second)[0]) ** 2 - np.sin(_directions(here, first)[0]) ** 2
+        return float(np.sqrt(max(marks, 0.0) + (plane.squareness_u_rad * lean) ** 2))
+
+    def _homographies(self) -> FloatArray:
+        """Plane to ideal pixels, (1, 3, 3); without a ruler they are the same."""
+        if self.rectification is None:
+            return np.eye(3)[None]
+        return self.rectification.homography[None]
 
     def scale_mm_per_px(self, pixel: FloatArray) -> float | None:
         """Size of a pixel at `pixel` (2,), mm; None without a ruler."""
@@ -93,7 +92,7 @@ class PicturePlane:
         ideal = self.undistort(
             pixel[None] + np.array([[-0.5, 0.0], [0.5, 0.0], [0, -0.5], [0, 0.5]])
         )
-        places = _to_plane(self.rectification.homography.ravel()[:8], ideal)
+        places = _to_plane(self._homographies(), ideal)[0]
         along, down = places[1] - places[0], places[3] - places[2]
         area = abs(float(along[0] * down[1] - along[1] * down[0]))
         return self.rectification.pitch_mm * float(np.sqrt(area))
@@ -132,7 +131,7 @@ def rectify(
         camera,
         Rectification(
             homography=np.append(parameters, 1.0).reshape(3, 3),
-            covariance=variance * np.linalg.pinv(jacobian.T @ jacobian),
+            covariance=(variance * np.linalg.pinv(jacobian.T @ jacobian)).astype(np.float64),
             residual_px=residual,
             pitch_mm=ruler.pitch * 1e3,
             squareness_u_rad=float(np.radians(ruler.squareness_u_deg)),
@@ -163,19 +162,23 @@ def _project(parameters: FloatArray, grid: FloatArray) -> tuple[FloatArray, Floa
     return np.stack([u, v], axis=1), jacobian
 
 
-def _to_plane(parameters: FloatArray | None, ideal: FloatArray) -> FloatArray:
-    if parameters is None:
-        return ideal
-    inverse = np.linalg.inv(np.append(parameters, 1.0).reshape(3, 3))
-    places = np.column_stack([ideal, np.ones(len(ideal))]) @ inverse.T
-    flat: FloatArray = places[:, :2] / places[:, 2:]
+def _to_plane(homographies: FloatArray, ideal: FloatArray) -> FloatArray:
+    """Plane points (m, n, 2) of ideal pixels (n, 2) under each homography (m, 3, 3)."""
+    places = np.column_stack([ideal, np.ones(len(ideal))]) @ np.linalg.inv(homographies).mT
+    flat: FloatArray = places[..., :2] / places[..., 2:]
     return flat
 
 
-def _direction(parameters: FloatArray | None, segment: FloatArray) -> float:
-    start, end = _to_plane(parameters, segment)
-    return float(np.arctan2(end[1] - start[1], end[0] - start[0]))
+def _directions(homographies: FloatArray, segment: FloatArray) -> FloatArray:
+    """Directions (m,) in rad of a segment (2, 2) in each plane."""
+    ends = _to_plane(homographies, segment)
+    along = ends[:, 1] - ends[:, 0]
+    directions: FloatArray = np.arctan2(along[:, 1], along[:, 0])
+    return directions
 
 
-def _turn(parameters: FloatArray | None, first: FloatArray, second: FloatArray) -> float:
-    return (_direction(parameters, second) - _direction(parameters, first)) % np.pi
+def _turns(homographies: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:
+    turns: FloatArray = (
+        _directions(homographies, second) - _directions(homographies, first)
+    ) % np.pi
+    return turns

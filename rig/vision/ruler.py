@@ -8,17 +8,16 @@ mirrored.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from rig.vision.errors import UntrustedFrameError
 from rig.vision.lines import FloatArray
-from rig.vision.segment import Image
+from rig.vision.segment import Image, as_image
 from rig.vision.tone import to_light
 
-SEARCH_FACTOR = 2  # marks are looked for at half size
 WHITE_LEVEL = 0.55  # of the brightest parts: between mark and paper under any usual light
 MIN_HOLE_PX = 3.0  # diameter at search size: smaller dots have no centre worth measuring
 MAX_HOLE_SHARE = 0.1  # of the frame's height
@@ -26,6 +25,8 @@ MIN_CIRCULARITY = 0.65  # 4 pi A / P^2 of a pixelated disc is about 0.8
 STEP_TOLERANCE = 0.2  # of the step: perspective and lens change neighbouring steps much less
 MIN_CORNER_DEG, MAX_CORNER_DEG = 60.0, 120.0
 MAX_CANDIDATES = 80
+PAPER_PX = (2.0, 4.0)  # ring of white paper beyond a mark's radius
+GREY_WEIGHTS = np.array([0.114, 0.587, 0.299])  # of B, G, R (ITU-R BT.601)
 
 
 @dataclass(frozen=True)
@@ -36,13 +37,16 @@ class RulerMarks:
     grid: FloatArray
 
 
-def find_ruler(image: Image, marks: int) -> RulerMarks:
+def find_ruler(levels: list[Image], marks: int) -> RulerMarks:
     """Marks of a ruler with `marks` on each leg; raises UntrustedFrameError without one.
 
-    The corner is needed, and all but one mark of each leg.
+    `levels` is the pyramid of the BGR frame. The corner and its neighbours are needed, and all
+    but one mark of each leg.
     """
-    grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
-    rough, diameters = _dark_holes(grey)
+    search = max(len(levels) - 2, 0)  # twice the size that is enough for the blue parts
+    rough, diameters = _dark_holes(as_image(cv2.cvtColor(levels[search], cv2.COLOR_BGR2GRAY)))
+    rough = (rough + 0.5) * 2**search - 0.5
+    diameters = diameters * 2**search
     wanted = 2 * marks + 1
     if len(rough) < wanted - 2:
         raise UntrustedFrameError(
@@ -58,29 +62,22 @@ def find_ruler(image: Image, marks: int) -> RulerMarks:
     indices = [corner, *first.values(), *second.values()]
     grid = [(0, 0), *((k, 0) for k in first), *((0, k) for k in second)]
     radius = 0.5 * float(np.median(diameters[indices]))
-    pixels = np.array([_centre(grey, rough[i], radius) for i in indices])
+    pixels = _centres(levels[0], rough[indices], radius)
     return RulerMarks(pixels=pixels, grid=np.array(grid, dtype=np.float64))
 
 
-def _dark_holes(grey: NDArray[np.uint8]) -> tuple[FloatArray, FloatArray]:
+def _dark_holes(grey: Image) -> tuple[FloatArray, FloatArray]:
     """Centres (n, 2) and diameters (n,) in pixels of round holes in bright surfaces."""
-    height, width = grey.shape
-    size = (max(width // SEARCH_FACTOR, 1), max(height // SEARCH_FACTOR, 1))
-    small = cv2.resize(
-        grey[: size[1] * SEARCH_FACTOR, : size[0] * SEARCH_FACTOR],
-        size,
-        interpolation=cv2.INTER_AREA,
-    )
-    histogram = cv2.calcHist([small], [0], None, [256], [0, 256]).ravel()
-    brightest = int(np.searchsorted(np.cumsum(histogram), 0.995 * small.size))
-    bright = cv2.threshold(small, WHITE_LEVEL * brightest, 255, cv2.THRESH_BINARY)[1]
+    histogram = cv2.calcHist([grey], [0], None, [256], [0, 256]).ravel()
+    brightest = int(np.searchsorted(np.cumsum(histogram), 0.995 * grey.size))
+    bright = cv2.threshold(grey, WHITE_LEVEL * brightest, 255, cv2.THRESH_BINARY)[1]
     contours, tree = cv2.findContours(bright, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     centres: list[tuple[float, float]] = []
     diameters: list[float] = []
     for contour, (_, _, _, parent) in zip(contours, tree[0] if len(contours) else (), strict=True):
         if parent < 0 or len(contour) < np.pi * MIN_HOLE_PX:
             continue
-        if len(contour) > np.pi * MAX_HOLE_SHARE * size[1]:
+        if len(contour) > np.pi * MAX_HOLE_SHARE * len(grey):
             continue
         area = cv2.contourArea(contour)
         perimeter = cv2.arcLength(contour, True)
@@ -92,8 +89,7 @@ def _dark_holes(grey: NDArray[np.uint8]) -> tuple[FloatArray, FloatArray]:
         diameters.append(2.0 * np.sqrt(area / np.pi) - 1.0)
     if not centres:
         return np.empty((0, 2)), np.empty(0)
-    points = (np.array(centres) + 0.5) * SEARCH_FACTOR - 0.5
-    sizes = np.array(diameters) * SEARCH_FACTOR
+    points, sizes = np.array(centres), np.array(diameters)
     if len(points) > MAX_CANDIDATES:  # a texture, not a ruler: keep the dots of a common size
         order = np.argsort(np.abs(sizes - np.median(sizes)), kind="stable")[:MAX_CANDIDATES]
         points, sizes = points[order], sizes[order]
@@ -104,25 +100,27 @@ Leg = dict[int, int]  # grid place on the leg (1, 2, ...) to index of the mark
 
 
 def _legs(points: FloatArray, marks: int) -> tuple[int, Leg, Leg] | None:
-    """Corner and legs of the L with most marks, or None; legs turn clockwise in the picture."""
-    separation = points[None, :, :] - points[:, None, :]
-    distance = np.hypot(separation[..., 0], separation[..., 1])
+    """Corner and legs of the L with most marks, or None; legs turn clockwise in the picture.
+
+    Only in the corner do two near marks stand at a right angle, so few walks are tried.
+    """
+    arms = points[None, :, :] - points[:, None, :]
+    distance = np.hypot(arms[..., 0], arms[..., 1])
     np.fill_diagonal(distance, np.inf)
+    near = np.argsort(distance, axis=1, kind="stable")[:, :4]
     best: tuple[int, Leg, Leg] | None = None
-    for corner in range(len(points)):
-        nearest = np.argsort(distance[corner], kind="stable")[:4]
-        legs = [leg for n in nearest if (leg := _walk(points, corner, int(n), marks)) is not None]
-        for i, one in enumerate(legs):
-            for two in legs[i + 1 :]:
-                a = points[max(one.items())[1]] - points[corner]
-                b = points[max(two.items())[1]] - points[corner]
-                cross, dot = float(a[0] * b[1] - a[1] * b[0]), float(a @ b)
-                opening = abs(np.degrees(np.arctan2(cross, dot)))
-                if not MIN_CORNER_DEG < opening < MAX_CORNER_DEG:
-                    continue
-                pair = (corner, one, two) if cross > 0.0 else (corner, two, one)
-                if best is None or len(one) + len(two) > len(best[1]) + len(best[2]):
-                    best = pair
+    for corner, neighbours in enumerate(near.tolist()):
+        for one, two in combinations(neighbours, 2):
+            a, b = arms[corner, one].tolist(), arms[corner, two].tolist()
+            cross, dot = a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1]
+            if not MIN_CORNER_DEG < abs(np.degrees(np.arctan2(cross, dot))) < MAX_CORNER_DEG:
+                continue
+            first = _walk(points, corner, one, marks)
+            second = _walk(points, corner, two, marks)
+            if first is None or second is None:
+                continue
+            if best is None or len(first) + len(second) > len(best[1]) + len(best[2]):
+                best = (corner, first, second) if cross > 0.0 else (corner, second, first)
     return best
 
 
@@ -146,24 +144,29 @@ def _walk(points: FloatArray, corner: int, neighbour: int, marks: int) -> Leg | 
     return leg if max(leg) == marks and len(leg) >= marks - 1 else None
 
 
-def _centre(grey: NDArray[np.uint8], rough: FloatArray, radius: float) -> FloatArray:
-    """Centroid of the missing light of one mark; even blur does not move it.
+def _centres(image: Image, rough: FloatArray, radius: float) -> FloatArray:
+    """Centroids (n, 2) of the light that each mark takes away; even blur does not move them.
 
     The paper around gives the white level as a plane, so that a light gradient does not pull.
     """
-    reach = int(np.ceil(radius + 4.0))
-    column, row = round(float(rough[0])), round(float(rough[1]))
-    top, left = max(row - reach, 0), max(column - reach, 0)
-    patch = to_light(grey[top : row + reach + 1, left : column + reach + 1].astype(np.float64))
-    y, x = np.mgrid[: patch.shape[0], : patch.shape[1]].astype(np.float64)
-    x, y = x + left - rough[0], y + top - rough[1]
+    reach = int(np.ceil(radius + PAPER_PX[1]))
+    steps = np.arange(-reach, reach + 1)
+    middle = np.rint(rough).astype(int)
+    rows = np.clip(middle[:, 1, None] + steps, 0, image.shape[0] - 1)[:, :, None]
+    columns = np.clip(middle[:, 0, None] + steps, 0, image.shape[1] - 1)[:, None, :]
+    patches = image[rows, columns]  # (n, k, k, 3)
+    grey = patches.astype(np.float64) @ GREY_WEIGHTS
+    light = to_light(grey)
+    x, y = np.broadcast_arrays(columns - rough[:, 0, None, None], rows - rough[:, 1, None, None])
     away = np.hypot(x, y)
-    paper = (away > radius + 2.0) & (away < radius + 4.0)
-    terms = np.stack([np.ones(int(paper.sum())), x[paper], y[paper]], axis=1)
-    plane = np.linalg.lstsq(terms, patch[paper], rcond=None)[0]
-    missing = 1.0 - patch / np.maximum(plane[0] + plane[1] * x + plane[2] * y, 1.0)
-    missing[away > radius + 2.0] = 0.0
-    total = float(missing.sum())
-    if total <= 0.0:
-        return rough
-    return rough + np.array([float((missing * x).sum()), float((missing * y).sum())]) / total
+    paper = (away > radius + PAPER_PX[0]) & (away < radius + PAPER_PX[1])
+    terms = np.stack([np.ones_like(x), x, y], axis=-1)
+    weighted = terms * paper[..., None]
+    normal = np.einsum("nyxi,nyxj->nij", weighted, terms)
+    white = np.linalg.solve(normal, np.einsum("nyxi,nyx->ni", weighted, light)[..., None])
+    missing = 1.0 - light / np.maximum((terms @ white[:, None])[..., 0], 1.0)
+    missing[away > radius + PAPER_PX[0]] = 0.0
+    total = np.maximum(missing.sum(axis=(1, 2)), 1.0)
+    pull = np.stack([(missing * x).sum(axis=(1, 2)), (missing * y).sum(axis=(1, 2))], axis=1)
+    centres: FloatArray = rough + pull / total[:, None]
+    return centres

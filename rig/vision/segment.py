@@ -21,7 +21,7 @@ Mask = NDArray[np.uint8]
 BLUENESS = np.array([[1.0, -0.5, -0.5]], dtype=np.float32)  # of B, G, R
 MIN_BLUENESS = 22.0  # grey levels: well above chroma noise of dark pixels
 MIN_SATURATION = 0.2  # blueness over B: a bluish white wall or skylight glare stays out
-COARSE_WIDTH = 320  # px: the search needs no more
+COARSE_WIDTH = 320  # px: the search for parts needs no more
 MIN_AREA = 60.0  # full-size px: smaller specks are noise
 MAX_PARTS = 12
 SEARCH_MARGIN = 2  # coarse pixels around a part that its full-size outline may reach
@@ -50,20 +50,24 @@ class BluePart:
         return hit
 
 
-def decimate(image: Image) -> tuple[Image, int]:
-    """Area-averaged copy about `COARSE_WIDTH` wide, and the integer factor."""
-    height, width = image.shape[:2]
-    factor = max(1, round(max(height, width) / COARSE_WIDTH))
-    if factor == 1:
-        return image, 1
-    size = (max(width // factor, 1), max(height // factor, 1))
-    crop = image[: size[1] * factor, : size[0] * factor]
-    small: Image = cv2.resize(crop, size, interpolation=cv2.INTER_AREA)
-    return small, factor
+def as_image(array: object) -> Image:
+    """What OpenCV returns, typed as the 8-bit array that it is."""
+    return np.asarray(array, dtype=np.uint8)
 
 
-def find_blue_parts(image: Image, small: Image, factor: int) -> list[BluePart]:
-    """Blue parts of a BGR image, largest first; `small` is the image decimated by `factor`."""
+def pyramid(image: Image) -> list[Image]:
+    """The frame and its area-averaged halves, down to at least `COARSE_WIDTH` px wide."""
+    levels = [image]
+    while max(levels[-1].shape[:2]) >= 2 * COARSE_WIDTH and min(levels[-1].shape[:2]) >= 2:
+        height, width = (length // 2 for length in levels[-1].shape[:2])
+        even = levels[-1][: 2 * height, : 2 * width]
+        levels.append(as_image(cv2.resize(even, (width, height), interpolation=cv2.INTER_AREA)))
+    return levels
+
+
+def find_blue_parts(levels: list[Image]) -> list[BluePart]:
+    """Blue parts of a BGR image, largest first; `levels` is its `pyramid`."""
+    image, small, factor = levels[0], levels[-1], 2 ** (len(levels) - 1)
     coarse = _blueness(small)
     mask = ((coarse > MIN_BLUENESS) & (coarse > MIN_SATURATION * small[..., 0])).astype(np.uint8)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
@@ -72,7 +76,7 @@ def find_blue_parts(image: Image, small: Image, factor: int) -> list[BluePart]:
     for label in order if count > 1 else ():
         if stats[label, cv2.CC_STAT_AREA] * factor**2 < MIN_AREA:
             break
-        region = _padded(stats[label, :4], small.shape)
+        region = _padded(stats[label, :4].tolist(), small.shape)
         mine = labels[region] == label
         level = float(np.median(coarse[region][mine]))
         part = _outline(image, mine.astype(np.uint8), region, factor, level)
@@ -82,12 +86,11 @@ def find_blue_parts(image: Image, small: Image, factor: int) -> list[BluePart]:
 
 
 def _blueness(image: Image) -> NDArray[np.float32]:
-    blueness: NDArray[np.float32] = cv2.transform(image.astype(np.float32), BLUENESS)
-    return blueness
+    return np.asarray(cv2.transform(image.astype(np.float32), BLUENESS), dtype=np.float32)
 
 
-def _padded(box: NDArray[np.int32], shape: tuple[int, ...]) -> tuple[slice, slice]:
-    left, top, width, height = (int(v) for v in box)
+def _padded(box: list[int], shape: tuple[int, ...]) -> tuple[slice, slice]:
+    left, top, width, height = box
     return (
         slice(max(top - SEARCH_MARGIN, 0), min(top + height + SEARCH_MARGIN, shape[0])),
         slice(max(left - SEARCH_MARGIN, 0), min(left + width + SEARCH_MARGIN, shape[1])),
@@ -117,13 +120,14 @@ def _outline(
     points = contour[:, 0, :].astype(np.float64)
     body = np.zeros_like(mask)
     cv2.drawContours(body, [contour], -1, 1, thickness=cv2.FILLED)
-    outline = points + (left, top)
+    corner = np.array([left, top], dtype=np.float64)
+    outline = points + corner
     low, high = outline.min(axis=0), outline.max(axis=0)
     moments = cv2.moments(contour)
     return BluePart(
         outline=outline,
         area_px=area,
-        centroid=np.array([moments["m10"], moments["m01"]]) / moments["m00"] + (left, top),
+        centroid=np.array([moments["m10"], moments["m01"]]) / moments["m00"] + corner,
         box=(int(low[0]), int(low[1]), int(high[0]) + 1, int(high[1]) + 1),
         mask=body,
         window=(left, top),
