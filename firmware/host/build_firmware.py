@@ -43,7 +43,9 @@ def compiler_arguments() -> list[str]:
 ffibuilder = FFI()
 ffibuilder.cdef("".join(declarations(header) for header in HEADERS))
 # for benches written in Python (tests)
-ffibuilder.cdef('extern "Python" void rig_bench_in_python(void *, const rig_pins_out *, rig_pins_in *);')
+ffibuilder.cdef(
+    'extern "Python" void rig_bench_in_python(void *, const rig_pins_out *, rig_pins_in *);'
+)
 ffibuilder.set_source(
     "rig.board._firmware",
     '#include "rig_host_test.h"',
@@ -53,6 +55,7 @@ ffibuilder.set_source(
     depends=[*relative(f"{CORE}/**/*.[hc]"), *relative(f"{HOST}/*.h")],
     extra_compile_args=compiler_arguments(),
 )
+
 
 def build_in_place() -> None:
     """Compile into rig/board, with everything else below build/."""

@@ -7,17 +7,15 @@ namespace {
 constexpr uint8_t kPolynomial8 = 0x1D;
 constexpr uint16_t kPolynomial16 = 0x1021;
 
-// Half a byte at a time: 16 bytes of table instead of 256, of which the Mega has few.
-constexpr uint8_t nibble_remainder(uint8_t nibble) {
-  uint8_t crc = static_cast<uint8_t>(nibble << 4);
-  for (uint8_t bit = 0; bit < 4; ++bit) {
-    const bool carry = (crc & 0x80) != 0;
-    crc = static_cast<uint8_t>(crc << 1);
-    if (carry) crc = static_cast<uint8_t>(crc ^ kPolynomial8);
-  }
-  return crc;
+constexpr uint8_t shifted(uint8_t crc) {
+  return static_cast<uint8_t>(crc << 1 ^ (crc & 0x80 ? kPolynomial8 : 0));
 }
 
+constexpr uint8_t nibble_remainder(uint8_t nibble) {
+  return shifted(shifted(shifted(shifted(static_cast<uint8_t>(nibble << 4)))));
+}
+
+// Half a byte at a time: 16 bytes of table instead of 256, of which the Mega has few.
 constexpr uint8_t kTable8[16] = {
     nibble_remainder(0),  nibble_remainder(1),  nibble_remainder(2),  nibble_remainder(3),
     nibble_remainder(4),  nibble_remainder(5),  nibble_remainder(6),  nibble_remainder(7),

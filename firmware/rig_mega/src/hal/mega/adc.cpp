@@ -1,0 +1,40 @@
+#include "adc.h"
+
+#include <avr/interrupt.h>
+#include <avr/io.h>
+
+#include "pins.h"
+
+namespace rig {
+namespace mega {
+
+namespace {
+
+volatile uint16_t running_sum;  // 19 conversions of 10 bits fit
+volatile uint8_t running_count;
+
+}  // namespace
+
+void adc_begin() {
+  DIDR0 = _BV(kPressureChannel);            // no digital input on the pin
+  ADMUX = _BV(REFS0) | kPressureChannel;    // reference AVCC
+  ADCSRB = 0;
+  // 125 kHz: 104 us a conversion, the fastest at full accuracy
+  ADCSRA = _BV(ADEN) | _BV(ADIE) | _BV(ADPS2) | _BV(ADPS1) | _BV(ADPS0) | _BV(ADSC);
+}
+
+void adc_collect(uint32_t &sum, uint8_t &count) {
+  sum = running_sum;
+  count = running_count;
+  running_sum = 0;
+  running_count = 0;
+}
+
+ISR(ADC_vect) {
+  running_sum = static_cast<uint16_t>(running_sum + ADC);
+  running_count = static_cast<uint8_t>(running_count + 1);
+  ADCSRA |= _BV(ADSC);
+}
+
+}  // namespace mega
+}  // namespace rig

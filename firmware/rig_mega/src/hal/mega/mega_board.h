@@ -1,0 +1,13 @@
+// The Mega as the core's board: pins in, pins out, sleep in between.
+#pragma once
+
+namespace rig {
+namespace mega {
+
+void begin();
+
+// One turn of the main loop; returns after the next interrupt.
+void step();
+
+}  // namespace mega
+}  // namespace rig

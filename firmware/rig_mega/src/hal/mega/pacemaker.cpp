@@ -1,0 +1,90 @@
+#include "pacemaker.h"
+
+#include <avr/interrupt.h>
+#include <avr/io.h>
+#include <util/atomic.h>
+
+#include "adc.h"
+#include "pins.h"
+
+namespace rig {
+namespace mega {
+
+namespace {
+
+// A compare value this close ahead of the counter, or behind it, would be missed for 32 ms.
+constexpr int16_t kSoonest = 8;
+
+StepSchedule planned = kNoSteps;
+StepSchedule running = kNoSteps;  // `count` is what is left
+volatile uint8_t ticks_waiting;
+TickSample sample_waiting;
+
+void step_at(uint16_t when) {
+  const uint16_t soonest = static_cast<uint16_t>(TCNT1 + kSoonest);
+  if (static_cast<int16_t>(when - soonest) < 0) when = soonest;
+  OCR1A = when;
+}
+
+}  // namespace
+
+void pacemaker_begin() {
+  TCCR1A = 0;
+  TCCR1B = _BV(CS11);  // 16 MHz / 8, no wave form
+  OCR1B = static_cast<uint16_t>(TCNT1 + kTimerTicksPerTick);
+  TIFR1 = _BV(OCF1A) | _BV(OCF1B);
+  TIMSK1 = _BV(OCIE1B);
+}
+
+bool tick_due(TickSample &sample) {
+  bool due = false;
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+    if (ticks_waiting != 0) {
+      ticks_waiting = static_cast<uint8_t>(ticks_waiting - 1);
+      sample = sample_waiting;
+      due = true;
+    }
+  }
+  return due;
+}
+
+void plan_steps(const StepSchedule &schedule) {
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) { planned = schedule; }
+}
+
+ISR(TIMER1_COMPB_vect) {
+  const uint16_t start = OCR1B;
+  OCR1B = static_cast<uint16_t>(start + kTimerTicksPerTick);
+  const uint16_t owed = running.count;  // none, unless interrupts were late
+  running = planned;
+  running.count = static_cast<uint16_t>(running.count + owed);
+  planned = kNoSteps;
+  if (running.count != 0) {
+    if (running.inward) {
+      PORTA |= kDirection;
+    } else {
+      PORTA &= static_cast<uint8_t>(~kDirection);
+    }
+    step_at(static_cast<uint16_t>(start + running.first));
+    TIFR1 = _BV(OCF1A);
+    TIMSK1 |= _BV(OCIE1A);
+  }
+  adc_collect(sample_waiting.adc_sum, sample_waiting.adc_count);
+  ticks_waiting = static_cast<uint8_t>(ticks_waiting + 1);
+}
+
+ISR(TIMER1_COMPA_vect) {
+  PORTA |= kStep;
+  const uint16_t left = static_cast<uint16_t>(running.count - 1);
+  running.count = left;
+  if (left == 0) {
+    TIMSK1 &= static_cast<uint8_t>(~_BV(OCIE1A));
+  } else {
+    step_at(static_cast<uint16_t>(OCR1A + running.interval));
+  }
+  __builtin_avr_delay_cycles(16);  // drivers want the pulse 2 us long
+  PORTA &= static_cast<uint8_t>(~kStep);
+}
+
+}  // namespace mega
+}  // namespace rig
