@@ -85,7 +85,7 @@ def make_ready(link: RigLink) -> None:
 
 
 def tare(link: RigLink) -> None:
-    """Tare the load cell while the actuator is vented."""
+    """Tare the load cell; nothing may touch it meanwhile."""
     link.command("tare")
     _await_flag(link, "tared", TARE_TIMEOUT_S, "check the load cell and its HX711")
 

@@ -169,9 +169,21 @@ def _experiments(
             continue
         if sweep.experiment != mounted:
             mounted = sweep.experiment
-            observer.stage(f"mounting the tip {FIXTURES[mounted]}")
-            context.bench.mount(FIXTURES[mounted])
+            _mount(context, mounted)
         _sweep(context, record, recorder, sweep, left)
+
+
+def _mount(context: RunContext, experiment: ExperimentName) -> None:
+    """Hold the tip as the experiment wants it.
+
+    The load cell is tared while nothing touches it: tared against the vented actuator it would
+    hide what the actuator's hysteresis leaves behind at zero pressure.
+    """
+    context.observer.stage(f"mounting the tip {FIXTURES[experiment]}")
+    context.bench.mount("free")
+    if FIXTURES[experiment] == "blocked":
+        tare(context.link)
+        context.bench.mount("blocked")
 
 
 def _sweep(
@@ -187,8 +199,6 @@ def _sweep(
     measure = _measurement(context, sweep.experiment)
     observer.stage(f"resting vented before repeat {sweep.repeat}")
     link.wait(section.rest)
-    if sweep.experiment == "blocked_force":
-        tare(link)
     approach(link, left[0], section)
     for key in left:
         observer.point_began(key)

@@ -7,15 +7,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.plant._plant import ffi, lib
 from rig.plant.specimen import Specimen
 from rig.spec.bench import BenchSpec
 from rig.spec.calibration import LoadCellCalibration, TransducerCalibration
 
+Array = NDArray[np.float64]
 AIR_VISCOSITY = 1.82e-5
 """Pa s at 20 degC (CRC Handbook of Chemistry and Physics)."""
 GRAVITY = 9.80665
@@ -98,18 +100,33 @@ class HiddenErrors:
         )
 
 
+class ResponseTables(Protocol):
+    """Quasi-static response over gauge `pressure` (n,) in Pa; SI units, each (n,)."""
+
+    @property
+    def pressure(self) -> Array: ...  # noqa: D102
+    @property
+    def angle(self) -> Array: ...  # noqa: D102
+    @property
+    def blocked_force(self) -> Array: ...  # noqa: D102
+    @property
+    def volume_free(self) -> Array: ...  # noqa: D102
+    @property
+    def volume_blocked(self) -> Array: ...  # noqa: D102
+
+
 class Plant:
     """One simulated bench with its specimen; advanced by the firmware's host HAL."""
 
-    def __init__(self, parameters: dict[str, Any], specimen: Specimen, seed: int) -> None:
+    def __init__(self, parameters: dict[str, Any], tables: ResponseTables, seed: int) -> None:
         self.parameters = dict(parameters)
         self._parameters = ffi.new("plant_parameters *", parameters)
         self._response = ffi.new("plant_response *")
-        pressure = specimen.pressure
+        pressure = tables.pressure
         grid = np.linspace(pressure[0], pressure[-1], TABLE_LENGTH)
         self._response.table_low, self._response.table_high = grid[0], grid[-1]
         for name in ("angle", "blocked_force", "volume_free", "volume_blocked"):
-            values = np.interp(grid, pressure, getattr(specimen, name))
+            values = np.interp(grid, pressure, getattr(tables, name))
             ffi.memmove(getattr(self._response, name), ffi.from_buffer(values), values.nbytes)
         self._plant = ffi.gc(lib.plant_new(self._parameters, self._response, seed), lib.plant_free)
         self._truth = ffi.new("plant_truth *")
@@ -195,9 +212,7 @@ def plant_parameters(
     )
     radius = bench.tubing.inner_diameter / 2
     tube_resistance = 8 * AIR_VISCOSITY * bench.tubing.length / (np.pi * radius**4)
-    counts_per_newton = (
-        load_cell.counts_per_gram * (1 + errors.counts_per_gram) / (1e-3 * GRAVITY)
-    )
+    counts_per_newton = load_cell.counts_per_gram * (1 + errors.counts_per_gram) / (1e-3 * GRAVITY)
     gain = transducer.gain * (1 + errors.transducer_gain)
     return {
         "ambient_pressure": bench.ambient.pressure,

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from rig.plant.plant import Faults, Fixture, Plant
-from rig.plant.specimen import Specimen
 
 AMBIENT = 101_325.0
 TEMPERATURE = 295.15
@@ -21,18 +21,24 @@ CAVITY = 13e-6
 DEAD_AND_TUBE = 1.5e-6 + 1.57e-6
 
 
-def rigid_specimen() -> Specimen:
+@dataclass(frozen=True)
+class Tables:
+    pressure: NDArray[np.float64]
+    angle: NDArray[np.float64]
+    blocked_force: NDArray[np.float64]
+    volume_free: NDArray[np.float64]
+    volume_blocked: NDArray[np.float64]
+
+
+def rigid() -> Tables:
     """A cavity that does not grow, with an angle and a force proportional to pressure."""
     pressure = np.linspace(-2e3, 30e3, 200)
-    return Specimen(
+    return Tables(
         pressure=pressure,
         angle=pressure * 1e-4,
         blocked_force=pressure * 3e-5,
-        volume_free=np.full_like(pressure, CAVITY) + pressure * 1e-16,
-        volume_blocked=np.full_like(pressure, CAVITY) + pressure * 1e-16,
-        creep_share=0.0,
-        creep_time=8.0,
-        hysteresis=0.0,
+        volume_free=np.full_like(pressure, CAVITY),
+        volume_blocked=np.full_like(pressure, CAVITY),
     )
 
 
@@ -71,8 +77,8 @@ def parameters(**changes: Any) -> dict[str, Any]:
     return base | changes
 
 
-def make(specimen: Specimen | None = None, seed: int = 1, **changes: Any) -> Plant:
-    return Plant(parameters(**changes), specimen or rigid_specimen(), seed)
+def make(seed: int = 1, **changes: Any) -> Plant:
+    return Plant(parameters(**changes), rigid(), seed)
 
 
 def push(plant: Plant, volume: float, milliseconds: int) -> None:
@@ -167,8 +173,7 @@ def test_a_disabled_motor_moves_nothing() -> None:
 
 
 def test_creep_approaches_its_share_exponentially() -> None:
-    specimen = rigid_specimen()
-    plant = make(specimen, creep_share=0.2, creep_time=4.0)
+    plant = make(creep_share=0.2, creep_time=4.0)
     push(plant, 6e-6, 100)
     plant.run(400)
     plant_pressure = plant.truth().gauge_pressure
