@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.mechanics.profile import side_profile
 from rig.plant.layout import ProfileFunction, lay_out
 from rig.plant.optics import draw_projection
 from rig.plant.scene import Image, Light, Scene
@@ -79,7 +80,7 @@ class VirtualCamera:
         geometry: Geometry,
         jpeg_quality: int,
         rng: np.random.Generator,
-        profile: ProfileFunction,
+        profile: ProfileFunction = side_profile,
     ) -> None:
         pose, light, cloth, noise = rng.spawn(4)
         self.projection = draw_projection(calibration, optics, pose)

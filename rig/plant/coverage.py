@@ -49,17 +49,17 @@ class Box(NamedTuple):
         )
 
 
-def bounding_box(outlines: list[Array], margin: int, width: int, height: int) -> Box:
-    """The pixels that `outlines` (each (n, 2), pixels) touch and `margin` more, in the picture."""
+def bounding_box(outlines: list[Array], margin: int, picture: Box) -> Box:
+    """The pixels of `picture` that `outlines` (each (n, 2), pixels) touch, and `margin` more."""
     low = np.min([outline.min(axis=0) for outline in outlines], axis=0)
     high = np.max([outline.max(axis=0) for outline in outlines], axis=0)
-    left, top = np.floor(low + 0.5).astype(int) - margin
-    right, bottom = np.ceil(high + 0.5).astype(int) + margin
+    left, top = (int(v) - margin for v in np.floor(low + 0.5))
+    right, bottom = (int(v) + margin for v in np.ceil(high + 0.5))
     return Box(
-        int(np.clip(left, 0, width)),
-        int(np.clip(top, 0, height)),
-        int(np.clip(right, 0, width)),
-        int(np.clip(bottom, 0, height)),
+        min(max(left, picture.left), picture.right),
+        min(max(top, picture.top), picture.bottom),
+        min(max(right, picture.left), picture.right),
+        min(max(bottom, picture.top), picture.bottom),
     )
 
 
@@ -124,4 +124,5 @@ def _integer_crossings(values: Array) -> Array:
     number = np.arange(len(segment)) - np.repeat(np.cumsum(count) - count, count)
     integer = first[segment] + number
     share = (integer - start[segment]) / (stop[segment] - start[segment])
-    return segment + np.clip(share, 0.0, 1.0)
+    place: Array = segment + np.clip(share, 0.0, 1.0)
+    return place

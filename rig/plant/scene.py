@@ -27,12 +27,13 @@ Image = NDArray[np.uint8]
 _OUTLINE_STEP = 1e-3  # metres between outline points: a lens bends less than 1e-3 pixels between
 _RELIEF = 0.0016  # metres, softness of the shading across the body
 _BLEED = 0.0012  # metres, how far the colour of rigid parts shines into the translucent body
-_COARSE = 4  # shading is computed at a quarter of the resolution
+_COARSE = 8  # shading is computed at an eighth of the resolution
 
 
-def _linear(red: int, green: int, blue: int) -> Array:
+def _linear(red: int, green: int, blue: int) -> Picture:
     """Linear light (3,) in BGR order of a colour given in grey levels."""
-    return (np.array([blue, green, red]) / 255.0) ** 2
+    levels = np.array([blue, green, red], np.float32) / np.float32(255)
+    return levels * levels
 
 
 ALUMINIUM = _linear(172, 176, 180)
@@ -43,6 +44,9 @@ MATTE_WHITE = _linear(226, 226, 222)
 MARK_BLACK = _linear(24, 24, 26)
 BACKGROUND = _linear(38, 37, 40)
 OCCLUDER = _linear(120, 120, 120)
+
+# What a rigid part adds to the colour of a body that it shines into.
+BLEEDING = np.float32(0.6) * (RIGID_BLUE - BODY)
 
 
 @dataclass(frozen=True)
@@ -58,7 +62,10 @@ class Light:
         """Brightness (height, width) of every pixel."""
         x = (np.arange(width) - 0.5 * (width - 1)) / width * np.cos(self.direction)
         y = (np.arange(height) - 0.5 * (height - 1)) / width * np.sin(self.direction)
-        return (1 + self.gradient * (x[None, :] + y[:, None])).astype(np.float32)
+        field: Picture = np.float32(1) + np.float32(self.gradient) * np.add.outer(y, x).astype(
+            np.float32
+        )
+        return field
 
 
 class Scene:
@@ -85,12 +92,12 @@ class Scene:
         self._whole = Box(0, 0, projection.width, projection.height)
         self._light = light.field(projection.width, projection.height)
         self._connector = self._cover(layout.place(connector), self._whole)
-        ground = self._static_light(ruler, rng) * self._light[..., None]
-        self._ground = np.ascontiguousarray(ground, dtype=np.float32)
-        """Linear light of all that stands still but the connector."""
-        blue = (self._connector * self._light)[..., None] * RIGID_BLUE.astype(np.float32)
-        still = self._ground * (1 - self._connector)[..., None] + blue
-        self._still = self._developed(still)
+        self._ground = self._static_light(ruler, rng) * self._light
+        """Linear light (3, height, width) of all that stands still but the connector."""
+        blue = self._connector * self._light * RIGID_BLUE[:, None, None]
+        # Planes for one frame: fresh memory for each would cost more than the arithmetic.
+        self._scratch = np.empty((8, projection.height * projection.width), np.float32)
+        self._still = self._developed(self._ground * (1 - self._connector) + blue)
 
     def picture(self, profile: SideProfile, occluded: bool = False) -> Image:
         """The picture (height, width, 3), BGR, 8 bit, without noise, of the deformed actuator.
@@ -103,49 +110,58 @@ class Scene:
             for outline in (profile.end_cap, profile.bottom_layer, profile.bellow)
         ]
         bar = [project(_bar(place(profile.end_cap)))] if occluded else []
-        width, height = self._projection.width, self._projection.height
-        seen = bounding_box(parts + bar, self._reach, width, height)
-        box = bounding_box(parts + bar, 2 * self._reach, width, height)
+        seen = bounding_box(parts + bar, self._reach, self._whole)
+        box = bounding_box(parts + bar, 2 * self._reach, self._whole)
         picture = self._still.copy()
         if seen.empty:
             return picture
         light = self._actuator_light(parts, box)
         if bar:
-            weight = coverage(bar[0], box)[..., None]
-            light = light * (1 - weight) + weight * OCCLUDER.astype(np.float32)
+            light = _over(light, OCCLUDER[:, None, None], coverage(bar[0], box))
         developed = self._developed(light)
         picture[seen.slices] = developed[seen.within(box).slices]
         return picture
 
     def _actuator_light(self, parts: list[Array], box: Box) -> Picture:
-        """Linear light (rows, columns, 3) of the ground with the actuator before it.
+        """Linear light (3, rows, columns) of the ground with the actuator before it.
 
         From front to back each part takes at most the share of a pixel that is left: exact where
         parts adjoin and where one hides the other.
         """
-        rigid = self._connector[box.slices]
-        left = 1 - rigid
+        scratch = self._scratch[:, : box.shape[0] * box.shape[1]].reshape(-1, *box.shape)
+        seen, (left, rigid, body, brightness, bleed) = scratch[:3], scratch[3:]
+        light = self._light[box.slices]
+        rigid[:] = self._connector[box.slices]
+        np.subtract(1, rigid, out=left)
         weights = []
         for outline in parts:
-            weight = np.minimum(coverage(outline, box), left)
-            left -= weight
-            weights.append(weight)
-        cap, bottom, bellow = weights
-        light = self._light[box.slices]
-        relief, bleed = self._shading(1 - rigid - left, rigid + cap)
-        relief *= light
-        bottom = bottom * relief
-        bellow = bellow * relief
-        planes = cv2.merge([(rigid + cap) * light, bottom, bellow, (bottom + bellow) * bleed])
-        colours = np.stack(
-            [RIGID_BLUE, BOTTOM_LAYER, BODY, 0.6 * (RIGID_BLUE - BODY)], axis=1
-        ).astype(np.float32)
-        surfaces = cv2.transform(planes, colours)
-        seen_ground = cv2.multiply(self._ground[box.slices], cv2.merge([left, left, left]))
-        return np.asarray(cv2.add(seen_ground, surfaces, dst=surfaces))
+            part = bounding_box([outline], 0, box)
+            here = part.within(box).slices
+            weight = coverage(outline, part)
+            np.minimum(weight, left[here], out=weight)
+            left[here] -= weight
+            weights.append((here, weight))
+        (cap_here, cap), *soft = weights
+        rigid[cap_here] += cap
+        np.subtract(1, left, out=body)
+        self._shade(body, rigid, brightness, bleed)
+        brightness *= light
+        rigid *= light
 
-    def _shading(self, body: Picture, rigid: Picture) -> tuple[Picture, Picture]:
-        """Brightness of the translucent body, and how much of the rigid parts shines into it."""
+        np.multiply(self._ground[:, *box.slices], left, out=seen)
+        _add_light(seen, RIGID_BLUE, rigid)
+        for (here, weight), colour in zip(soft, (BOTTOM_LAYER, BODY), strict=True):
+            weight *= brightness[here]
+            _add_light(seen[:, *here], colour, weight)
+            weight *= bleed[here]
+            _add_light(seen[:, *here], BLEEDING, weight)
+        return seen
+
+    def _shade(self, body: Picture, rigid: Picture, brightness: Picture, bleed: Picture) -> None:
+        """Write the brightness of the soft body and the share of rigid colour shining into it.
+
+        `body` is the coverage of the whole actuator, `rigid` that of its rigid parts.
+        """
         rows, columns = body.shape
         coarse = (max(columns // _COARSE, 1), max(rows // _COARSE, 1))
         pixel = self._projection.distance / self._projection.focal[0] * _COARSE
@@ -154,28 +170,27 @@ class Scene:
         # Lit from the upper right: a slope towards the light is brighter.
         slope = np.roll(thick, (1, -1), (0, 1)) - np.roll(thick, (-1, 1), (0, 1))
         relief = np.clip(0.62 + 0.42 * thick**2 - 0.55 * slope, 0.3, 1.25)
-        bleed = cv2.GaussianBlur(
-            cv2.resize(rigid, coarse, interpolation=cv2.INTER_AREA), (0, 0), _BLEED / pixel
-        )
-        return (
-            np.asarray(cv2.resize(relief, (columns, rows)), dtype=np.float32),
-            np.asarray(cv2.resize(bleed, (columns, rows)), dtype=np.float32),
-        )
+        cv2.resize(relief, (columns, rows), dst=brightness)
+        near = cv2.resize(rigid, coarse, interpolation=cv2.INTER_AREA)
+        near = cv2.GaussianBlur(near, (0, 0), _BLEED / pixel)
+        cv2.resize(near, (columns, rows), dst=bleed)
 
     def _developed(self, light: Picture) -> Image:
-        """Linear light through point spread and tone curve to 8 bits."""
-        if self._blur > 0:
-            light = cv2.GaussianBlur(light, (0, 0), self._blur)
-        return np.asarray(cv2.convertScaleAbs(cv2.sqrt(light), alpha=255.0))
+        """8-bit BGR of linear light (3, rows, columns): point spread, then tone curve."""
+        planes = []
+        for plane in light:
+            spread = cv2.GaussianBlur(plane, (0, 0), self._blur) if self._blur > 0 else plane
+            planes.append(cv2.convertScaleAbs(cv2.sqrt(spread), alpha=255.0))
+        return np.asarray(cv2.merge(planes), dtype=np.uint8)
 
     def _cover(self, outline: Array, box: Box) -> Picture:
         """Coverage of an outline in bench metres."""
         return coverage(self._projection.project(densified(outline, _OUTLINE_STEP)), box)
 
     def _static_light(self, ruler: RulerCalibration, rng: np.random.Generator) -> Picture:
-        """Linear reflectance of background, frame and ruler."""
+        """Linear reflectance (3, height, width) of background, frame and ruler."""
         width, height = self._projection.width, self._projection.height
-        light = BACKGROUND * _cloth(width, height, rng)[..., None]
+        light = BACKGROUND[:, None, None] * _cloth(width, height, rng)
         left, top, right, _ = self._projection.view()
         overhang = right - left
         edge = self._layout.frame_edge
@@ -187,15 +202,17 @@ class Scene:
                 (left - overhang, edge),
             ]
         )
-        brushed = ALUMINIUM * _brushed(width, height, rng)[..., None]
+        brushed = ALUMINIUM[:, None, None] * _brushed(width, height, rng)
         light = _over(light, brushed, self._cover(frame, self._whole))
         corner = self._layout.ruler_corner
-        light = _over(light, MATTE_WHITE, self._cover(ruler_outline(corner, ruler), self._whole))
+        outline = self._cover(ruler_outline(corner, ruler), self._whole)
+        light = _over(light, MATTE_WHITE[:, None, None], outline)
         turn = np.linspace(0, 2 * np.pi, 180, endpoint=False)
         disc = 0.5 * MARK_DIAMETER * np.column_stack((np.cos(turn), np.sin(turn)))
         for centre in mark_centres(corner, ruler):
-            light = _over(light, MARK_BLACK, self._cover(centre + disc, self._whole))
-        return light.astype(np.float32)
+            mark = self._cover(centre + disc, self._whole)
+            light = _over(light, MARK_BLACK[:, None, None], mark)
+        return light
 
 
 def densified(outline: Array, step: float) -> Array:
@@ -211,28 +228,37 @@ def densified(outline: Array, step: float) -> Array:
 
 def _bar(cap: Array) -> Array:
     """An upright bar that hides the end cap, bench metres."""
-    centre = cap.mean(axis=0)
-    return centre + np.array([(-0.013, -0.02), (0.013, -0.02), (0.013, 0.02), (-0.013, 0.02)])
+    corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * (0.013, 0.020)
+    bar: Array = cap.mean(axis=0) + corners
+    return bar
 
 
-def _over(light: Array, colour: Array, weight: Picture) -> Array:
-    mixed: Array = light + weight[..., None] * (colour - light)
+def _add_light(light: Picture, colour: Picture, weight: Picture) -> None:
+    """Add `weight` (rows, columns) times `colour` (3,) to `light` (3, rows, columns) in place."""
+    for plane, level in zip(light, colour.tolist(), strict=True):
+        cv2.scaleAdd(weight, level, plane, dst=plane)
+
+
+def _over(light: Picture, colour: Picture, weight: Picture) -> Picture:
+    """Linear light (3, rows, columns) with `colour` before it where `weight` (rows, columns)."""
+    mixed: Picture = light + weight * (colour - light)
     return mixed
 
 
-def _cloth(width: int, height: int, rng: np.random.Generator) -> Array:
+def _cloth(width: int, height: int, rng: np.random.Generator) -> Picture:
     """Relative brightness of dark woven cloth: threads both ways, and slow unevenness."""
-    threads = rng.normal(size=(2, height, width)).astype(np.float32)
+    threads = rng.standard_normal((2, height, width), np.float32)
     across = cv2.GaussianBlur(threads[0], (0, 0), sigmaX=9.0, sigmaY=0.9)
     along = cv2.GaussianBlur(threads[1], (0, 0), sigmaX=0.9, sigmaY=9.0)
+    slow = cv2.resize(
+        rng.standard_normal((6, 10), np.float32), (width, height), interpolation=cv2.INTER_CUBIC
+    )
     weave = across / across.std() + along / along.std()
-    slow = cv2.resize(rng.normal(size=(6, 10)), (width, height), interpolation=cv2.INTER_CUBIC)
-    cloth: Array = np.clip(1 + 0.28 * weave + 0.18 * slow, 0.15, None)
-    return cloth
+    return np.asarray(np.clip(1 + 0.22 * weave + 0.18 * slow, 0.15, None), dtype=np.float32)
 
 
-def _brushed(width: int, height: int, rng: np.random.Generator) -> Array:
+def _brushed(width: int, height: int, rng: np.random.Generator) -> Picture:
     """Relative brightness of brushed aluminium: streaks along x."""
-    streaks = cv2.GaussianBlur(rng.normal(size=(height, width)), (0, 0), sigmaX=60.0, sigmaY=0.8)
-    brushed: Array = 1 + 0.05 * streaks / streaks.std()
-    return brushed
+    noise = rng.standard_normal((height, width), np.float32)
+    streaks = cv2.GaussianBlur(noise, (0, 0), sigmaX=60.0, sigmaY=0.8)
+    return np.asarray(1 + 0.05 * streaks / streaks.std(), dtype=np.float32)
