@@ -31,8 +31,10 @@ def problems_of(error: ValidationError, tree: Tree, model: type[BaseModel]) -> l
     """Every error of the validation of `tree` against `model`, in the order of the file."""
     problems = [_problem(details, tree, model) for details in error.errors(include_url=False)]
     # A union without a discriminator reports one error for each member at the same place.
-    unique = {(p.field, p.line, p.column): p for p in reversed(problems)}.values()
-    return sorted(unique, key=lambda p: (p.line or 0, p.column or 0))
+    unique: dict[tuple[str, int | None, int | None], Problem] = {}
+    for problem in problems:
+        unique.setdefault((problem.field, problem.line, problem.column), problem)
+    return sorted(unique.values(), key=lambda p: (p.line or 0, p.column or 0))
 
 
 def did_you_mean(given: str, known: Iterable[str]) -> str:

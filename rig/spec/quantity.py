@@ -26,8 +26,8 @@ MAX_CHARACTERS = 60
 # The grammar is checked before pint sees the text: pint evaluates arithmetic such as 2**9999999.
 _QUANTITY = re.compile(
     r"""
-    (?P<number> [+-]? (?: \d{1,20} / \d{1,20}
-                        | (?: \d{1,20} (?: \.\d{0,20} )? | \.\d{1,20} ) (?: [eE][+-]?\d{1,3} )? ) )
+    (?P<number> [+-]? (?: \d+ / \d+
+                        | (?: \d+ (?: \.\d* )? | \.\d+ ) (?: [eE][+-]?\d{1,3} )? ) )
     \s* (?P<unit> .* )
     """,
     re.VERBOSE | re.ASCII,
@@ -226,9 +226,16 @@ class Unit:
             raise ValueError(f"{_describe(value)} is no quantity")
         if isinstance(value, float) and not math.isfinite(value):
             raise ValueError(f"'{value}' is not a finite number")
-        text = value if isinstance(value, str) else repr(value)
+        text = value if isinstance(value, str) else repr(_float(value))
         _, unit = _split(text)
         return to_si(text if unit else f"{text} {self.lab}", self.si)
+
+
+def _float(value: int | float) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        raise ValueError("the whole number is too large") from None
 
 
 def _describe(value: Any) -> str:

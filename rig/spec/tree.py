@@ -159,7 +159,11 @@ class _Builder:
             if not isinstance(key_node, ScalarNode) or key_node.tag == _tag("merge"):
                 self.complain(key_node, location, "expected plain text as key")
                 continue
-            key = str(key_node.value)
+            try:
+                key = _whole(key_node.value)
+            except ValueError as error:
+                self.complain(key_node, location, str(error))
+                continue
             if key in first_lines:
                 message = f"duplicate key '{key}', first given in line {first_lines[key]}; keep one"
                 self.complain(key_node, (*location, key), message)
@@ -180,10 +184,14 @@ class _Builder:
 
     def _scalar(self, node: ScalarNode, location: Location) -> Any:
         tag = str(node.tag)
+        if tag == _tag("str"):
+            try:
+                return _whole(node.value)
+            except ValueError as error:
+                self.complain(node, location, str(error))
+                return None
         text = str(node.value)
         try:
-            if tag == _tag("str"):
-                return text
             if tag == _tag("null"):
                 return None
             if tag == _tag("bool"):
@@ -208,6 +216,14 @@ _DATE = re.compile(r"\d{4}-\d{2}-\d{2}")
 
 def _tag(name: str) -> str:
     return f"tag:yaml.org,2002:{name}"
+
+
+def _whole(text: str) -> str:
+    """`text` with pairs of surrogates joined, as JSON escapes them; ValueError for half a pair."""
+    try:
+        return text.encode("utf-16", "surrogatepass").decode("utf-16")
+    except UnicodeDecodeError:
+        raise ValueError("half a character (a lone surrogate) is no text") from None
 
 
 def _integer(text: str) -> int:
