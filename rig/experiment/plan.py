@@ -60,19 +60,13 @@ class Plan:
 def make_plan(protocol: ProtocolSpec, actuator: ActuatorSpec, bench: BenchSpec) -> Plan:
     """Lay out a protocol for an actuator on a bench.
 
-    Raises LimitError when a pressure is above what actuator, transducer or board allow, or when
-    the protocol holds no experiment.
+    Raises LimitError when a pressure is above what actuator, transducer or board allow.
     """
     sections: list[tuple[ExperimentName, SweepProtocol]] = []
     if protocol.deformation is not None:
         sections.append(("deformation", protocol.deformation))
     if protocol.blocked_force is not None:
         sections.append(("blocked_force", protocol.blocked_force))
-    if not sections:
-        raise LimitError(
-            f"the protocol '{protocol.name}' holds no experiment; add a section 'deformation' or "
-            "'blocked_force'."
-        )
     sweeps: list[Sweep] = []
     duration_s = 0.0
     for name, section in sections:
@@ -113,7 +107,8 @@ def _check_limits(
             raise LimitError(
                 f"the protocol '{protocol}' asks for {highest / 1e3:g} kPa in {experiment}, above "
                 f"{limit / 1e3:g} kPa, {what}. Nothing was moved. Lower "
-                f"{experiment}.pressures.stop of the protocol, or raise the limit if you are sure that it may be."
+                f"{experiment}.pressures.stop of the protocol, or raise the limit if you are sure "
+                "that it may be."
             )
 
 

@@ -14,6 +14,7 @@ from rig.spec.calibration import TransducerCalibration
 
 HOMING_TIMEOUT_S = 60.0
 VENT_TIMEOUT_S = 60.0
+FAULT_VENT_S = 30.0
 ZERO_TIMEOUT_S = 10.0
 TARE_TIMEOUT_S = 30.0
 
@@ -104,12 +105,21 @@ def make_safe(link: RigLink) -> str:
     link.raise_faults(False)
     try:
         if link.status is not None and link.status.state == "fault":
-            # the board vents by itself on a fault
-            return "The board vented by itself and holds its fault."
+            return _watch_fault_vent(link)
         vent(link)
     except LinkError as error:
         return f"The bench could not be vented from here ({error}) Vent it by hand."
     return "The bench was vented and the plunger is home."
+
+
+def _watch_fault_vent(link: RigLink) -> str:
+    """On a fault the board vents by itself; stay until the plunger is home, or for a while."""
+    end_s = link.now_s + FAULT_VENT_S
+    while link.now_s < end_s:
+        link.receive()
+        if link.status is not None and link.status.home_switch:
+            return "The board vented by itself, its plunger is home, and it holds its fault."
+    return "The board has opened its valve and holds its fault; the plunger is not home."
 
 
 def _await_flag(link: RigLink, flag: str, timeout_s: float, hint: str) -> None:

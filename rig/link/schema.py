@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import binascii
 from collections.abc import Mapping
+from decimal import Decimal
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
@@ -36,6 +37,7 @@ class Schema:
         self.text = text.replace("\r\n", "\n")
         self._database = _parse(self.text)
         self._by_id = {m.frame_id: m for m in self._database.messages}
+        self._decimals = {m.name: _scaled_signals(m) for m in self._database.messages}
         self._by_name = {m.name: m for m in self._database.messages}
 
     @cached_property
@@ -64,6 +66,9 @@ class Schema:
         if definition is None or len(payload) != definition.length:
             return None
         values: dict[str, float | int] = definition.decode(payload, decode_choices=False)
+        for signal, decimals in self._decimals[definition.name]:
+            # a scaled signal is a decimal number: 0.05, not 0.05000000000000071
+            values[signal] = round(values[signal], decimals)
         return definition.name, values
 
     def choices(self, message: str, signal: str) -> dict[int, str]:
@@ -77,6 +82,15 @@ class Schema:
             message.name: {signal.name: signal.unit or "" for signal in message.signals}
             for message in self._database.messages
         }
+
+
+def _scaled_signals(message: Any) -> list[tuple[str, int]]:
+    """Signals with a decimal scale, and how many decimals their values have."""
+    return [
+        (signal.name, -int(Decimal(str(signal.scale)).normalize().as_tuple().exponent))
+        for signal in message.signals
+        if isinstance(signal.scale, float) and signal.scale != int(signal.scale)
+    ]
 
 
 def _parse(text: str) -> Any:

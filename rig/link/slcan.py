@@ -6,10 +6,12 @@ milliseconds modulo 60,000; a line ends with a carriage return.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 TIMESTAMP_PERIOD_MS = 60_000
+CLOCK_WINDOW_MS = 10_000
 OPEN_WITH_TIMESTAMPS = b"\rC\rS6\rZ1\rO\r"
 CLOSE = b"C\r"
 MAX_LINE = 64
@@ -29,6 +31,37 @@ def encode_frame(frame_id: int, payload: bytes) -> bytes:
     return b"t%03X%X%s\r" % (frame_id, len(payload), payload.hex().upper().encode())
 
 
+class BoardClock:
+    """Maps the board's time stamps to bench time, though the two clocks start and drift apart.
+
+    A frame arrives some latency after its stamp; the quickest frame of the last ten to twenty
+    seconds is taken to have had none.
+    """
+
+    def __init__(self) -> None:
+        self._reference_ms: float | None = None
+        self._quickest_ms = 0.0
+        self._quickest_before_ms = 0.0
+        self._window_ends_ms = 0.0
+
+    def times_s(self, now_ms: float, stamps_ms: Sequence[int]) -> list[float]:
+        """Bench times in seconds of frames that arrive now with these stamps."""
+        if not stamps_ms:
+            return []
+        apart = [now_ms - stamp for stamp in stamps_ms]
+        if self._reference_ms is None:
+            self._reference_ms = min(apart, key=lambda ms: ms % TIMESTAMP_PERIOD_MS)
+            self._window_ends_ms = now_ms + CLOCK_WINDOW_MS
+        reference, half = self._reference_ms, TIMESTAMP_PERIOD_MS / 2
+        late = [(ms - reference + half) % TIMESTAMP_PERIOD_MS - half for ms in apart]
+        if now_ms > self._window_ends_ms:
+            self._window_ends_ms = now_ms + CLOCK_WINDOW_MS
+            self._quickest_before_ms, self._quickest_ms = self._quickest_ms, min(late)
+        self._quickest_ms = min(self._quickest_ms, *late)
+        quickest = min(self._quickest_ms, self._quickest_before_ms)
+        return [(now_ms - (ms - quickest)) / 1000 for ms in late]
+
+
 @dataclass
 class SlcanParser:
     """Turns received bytes into frames; keeps the incomplete line for the next call.
@@ -39,16 +72,17 @@ class SlcanParser:
 
     malformed: int = 0
     _rest: bytes = b""
+    _clock: BoardClock = field(default_factory=BoardClock)
 
     def feed(self, data: bytes, now_s: float) -> list[RawFrame]:
-        """Frames completed by `data`; time stamps are unwrapped to the last minute before now."""
+        """Frames completed by `data`, which arrived at bench time `now_s`."""
         lines = (self._rest + data).split(b"\r")
         self._rest = lines.pop()
         if len(self._rest) > MAX_LINE:
             self.malformed += 1
             self._rest = b""
-        frames: list[RawFrame] = []
-        now_ms = round(now_s * 1000)
+        frames: list[tuple[int, bytes]] = []
+        stamps: list[int | None] = []
         for line in lines:
             line = line.lstrip(b"\a\nzZ")  # replies to our own commands, bells
             if line[:1] != b"t":
@@ -60,16 +94,13 @@ class SlcanParser:
                 stamp = line[end:]
                 if len(line) < end or len(stamp) not in (0, 4):
                     raise ValueError("length")
-                if stamp:
-                    age_ms = (now_ms - int(stamp, 16)) % TIMESTAMP_PERIOD_MS
-                    # a board clock slightly ahead of ours wraps to almost a minute ago
-                    if age_ms > TIMESTAMP_PERIOD_MS - 1000:
-                        age_ms -= TIMESTAMP_PERIOD_MS
-                    time_s = (now_ms - age_ms) / 1000
-                else:
-                    time_s = now_s
+                stamps.append(int(stamp, 16) if stamp else None)
             except ValueError:
                 self.malformed += 1
                 continue
-            frames.append(RawFrame(time_s, frame_id, payload))
-        return frames
+            frames.append((frame_id, payload))
+        times = iter(self._clock.times_s(now_s * 1000, [s for s in stamps if s is not None]))
+        return [
+            RawFrame(now_s if stamp is None else next(times), *frame)
+            for frame, stamp in zip(frames, stamps, strict=True)
+        ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import can
+import numpy as np
 import pytest
 from can.interfaces.slcan import slcanBus
 from hypothesis import given
@@ -52,21 +53,35 @@ def test_a_good_frame_after_noise_is_read(noise: bytes, frame: tuple[int, bytes]
     assert (got[-1].frame_id, got[-1].payload) == frame
 
 
-@pytest.mark.parametrize(
-    ("now_s", "stamp_ms", "expected_s"),
-    [
-        (10.0, 9_980, 9.98),
-        (60.0, 59_990, 59.99),
-        (60.01, 5, 60.005),
-        (3600.002, 59_999, 3599.999),
-        (10.0, 10_020, 10.02),  # the board's clock a little ahead
-    ],
-)
-def test_time_stamps_are_unwrapped_to_the_last_minute(
-    now_s: float, stamp_ms: int, expected_s: float
-) -> None:
-    (frame,) = SlcanParser().feed(line(0x100, b"\0" * 8, stamp_ms), now_s)
-    assert frame.time_s == pytest.approx(expected_s, abs=1e-9)
+def stamped(parser: SlcanParser, now_s: float, *stamps_ms: int) -> list[float]:
+    data = b"".join(line(0x100, b"\0" * 8, stamp) for stamp in stamps_ms)
+    return [frame.time_s for frame in parser.feed(data, now_s)]
+
+
+@pytest.mark.parametrize("board_ahead_ms", [0, 17, 59_999, 123_456])
+def test_stamps_become_bench_time_whenever_the_board_was_started(board_ahead_ms: int) -> None:
+    parser = SlcanParser()
+    for now_ms in range(0, 200_000, 100):
+        stamps = [now_ms + board_ahead_ms - late for late in (80, 40, 0)]
+        expected = [(now_ms - late) / 1000 for late in (80, 40, 0)]
+        assert stamped(parser, now_ms / 1000, *stamps) == pytest.approx(expected, abs=1e-9)
+
+
+def test_latency_makes_no_frame_late() -> None:
+    parser = SlcanParser()
+    rng = np.random.default_rng(1)
+    for now_ms in range(0, 60_000, 10):
+        late = int(rng.integers(0, 30))
+        (time_s,) = stamped(parser, (now_ms + late) / 1000, now_ms)
+        if now_ms > 5_000:
+            assert time_s == pytest.approx(now_ms / 1000, abs=1.5e-3)
+
+
+def test_a_board_clock_that_drifts_100_ppm_is_followed() -> None:
+    parser = SlcanParser()
+    for now_ms in range(0, 600_000, 20):
+        (time_s,) = stamped(parser, now_ms / 1000, round(now_ms * 0.9999))
+        assert time_s == pytest.approx(now_ms / 1000, abs=4e-3)
 
 
 def test_truncated_and_non_hexadecimal_lines_count_as_malformed() -> None:

@@ -1,0 +1,124 @@
+"""Runs on the virtual bench, short enough for tests; the slow default run is behind a marker."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import pytest
+
+from rig.board.truth import TruthSample, read_truth
+from rig.board.virtual import VirtualBench
+from rig.experiment.bench import Nobody, Observer
+from rig.experiment.plan import make_plan
+from rig.experiment.run import RunOutcome, new_run, resume_run
+from rig.experiment.setup import RunRequest
+from rig.mechanics.profile import cavity_volume
+from rig.record.reader import RunReader
+from rig.spec.protocol import ProtocolSpec
+from rig.spec.workspace import Workspace
+
+ROOT = Path(__file__).resolve().parents[2]
+SHORT = {
+    "kind": "protocol",
+    "name": "short",
+    "deformation": {
+        "pressures": {"start": 0, "stop": 10, "step": 5},
+        "repeats": 1,
+        "descending_repeats": 1,
+        "hold": 2,
+        "rest": 1,
+        "frames": 2,
+    },
+    "blocked_force": {
+        "pressures": {"start": 0, "stop": 10, "step": 5},
+        "repeats": 1,
+        "hold": 2,
+        "rest": 1,
+        "readings": 20,
+    },
+}
+
+
+def make_request(protocol: dict[str, object] = SHORT, seed: int = 1) -> RunRequest:
+    setup = Workspace(ROOT).setup("bellow-bending", "virtual")
+    # the files behind a run are its attachments: a replaced protocol must be there as well
+    spec = ProtocolSpec.model_validate(protocol)
+    source = replace(setup.sources["protocol"], spec=spec, text=_yaml(spec))
+    setup = replace(setup, protocol=spec, sources={**setup.sources, "protocol": source})
+    return RunRequest(
+        setup=setup,
+        plan=make_plan(spec, setup.actuator, setup.bench),
+        seed=seed,
+        cavity_volume=float(cavity_volume(setup.actuator.geometry, 0.0)),
+    )
+
+
+def _yaml(spec: ProtocolSpec) -> str:
+    from io import StringIO
+
+    from ruamel.yaml import YAML
+
+    data = spec.model_dump(exclude_none=True)
+    for section in ("deformation", "blocked_force"):
+        if section in data:
+            for name in ("start", "stop", "step"):
+                data[section]["pressures"][name] /= 1e3  # bare numbers are kPa
+            data[section]["settling"]["tolerance"] /= 1e3
+    stream = StringIO()
+    YAML().dump(data, stream)
+    return stream.getvalue()
+
+
+@dataclass(frozen=True)
+class VirtualRun:
+    folder: Path
+    outcome: RunOutcome
+
+    @property
+    def reader(self) -> RunReader:
+        return RunReader(self.folder)
+
+    def truth(self, segment: int = 1) -> list[TruthSample]:
+        name = "truth.mcap" if segment == 1 else f"truth-{segment}.mcap"
+        return read_truth(self.folder / name)
+
+
+def take(
+    folder: Path,
+    request: RunRequest,
+    *,
+    observer: Observer | None = None,
+    interrupted: Callable[[], None] | None = None,
+    prepare: Callable[[VirtualBench], None] | None = None,
+) -> VirtualRun:
+    bench = VirtualBench(request.setup, request.seed, folder / "truth.mcap")
+    if prepare is not None:
+        prepare(bench)
+    try:
+        outcome = new_run(folder, bench, request, observer or Nobody(), interrupted)
+    finally:
+        bench.close()
+    return VirtualRun(folder, outcome)
+
+
+def take_rest(folder: Path, request: RunRequest) -> VirtualRun:
+    points = RunReader(folder).points()
+    bench = VirtualBench(
+        request.setup,
+        request.seed,
+        folder / "truth-2.mcap",
+        segment=1,
+        start_s=points[-1].measured_to_s if points else 0.0,
+    )
+    try:
+        outcome = resume_run(folder, bench, request, Nobody(), [p.key for p in points])
+    finally:
+        bench.close()
+    return VirtualRun(folder, outcome)
+
+
+@pytest.fixture(scope="session")
+def short_run(tmp_path_factory: pytest.TempPathFactory) -> VirtualRun:
+    return take(tmp_path_factory.mktemp("runs") / "short", make_request())

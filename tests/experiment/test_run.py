@@ -1,0 +1,207 @@
+"""Whole runs on the virtual bench: what is measured, what is recorded, how a run ends."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+from rig.board.virtual import VirtualBench
+from rig.experiment.bench import Nobody
+from rig.experiment.errors import AbortedError
+from rig.experiment.replay import ReplayedRun
+from rig.link.errors import BoardFaultError
+from rig.plant.plant import Faults
+from rig.record.documents import PointDocument
+from rig.record.reader import RunReader
+
+from .conftest import ROOT, VirtualRun, make_request, take, take_rest
+from .truth import errors
+
+ANGLE_TARGET_DEG = 0.2
+FORCE_TARGET_G = 0.1
+PRESSURE_TARGET_KPA = 0.05
+
+
+def keys(run: VirtualRun) -> list[tuple[str, int, str, float]]:
+    return [
+        (p.key.experiment, p.key.repeat, p.key.direction, p.key.target_kpa)
+        for p in run.reader.points()
+    ]
+
+
+def test_every_point_of_the_plan_is_measured_in_order(short_run: VirtualRun) -> None:
+    assert short_run.outcome.stop.exit_status == "success"
+    assert keys(short_run) == [
+        ("deformation", 1, "up", 0.0),
+        ("deformation", 1, "up", 5.0),
+        ("deformation", 1, "up", 10.0),
+        ("deformation", 1, "down", 5.0),
+        ("deformation", 1, "down", 0.0),
+        ("blocked_force", 1, "up", 0.0),
+        ("blocked_force", 1, "up", 5.0),
+        ("blocked_force", 1, "up", 10.0),
+    ]
+
+
+def test_what_is_measured_is_what_is_so(short_run: VirtualRun) -> None:
+    truth = short_run.truth()
+    angle = errors(short_run.reader.points(), truth, "deformation")
+    force = errors(short_run.reader.points(), truth, "blocked_force")
+    assert angle.rms < ANGLE_TARGET_DEG
+    assert force.rms < FORCE_TARGET_G
+    assert max(abs(angle.pressure_kpa).max(), abs(force.pressure_kpa).max()) < PRESSURE_TARGET_KPA
+
+
+@pytest.mark.parametrize("seed", [2, 3, 4])
+def test_the_pipeline_error_stays_below_target_at_other_seeds(seed: int, tmp_path: Path) -> None:
+    run = take(tmp_path / "run", make_request(seed=seed))
+    points, truth = run.reader.points(), run.truth()
+    assert errors(points, truth, "deformation").rms < ANGLE_TARGET_DEG
+    force = errors(points, truth, "blocked_force")
+    assert force.rms < FORCE_TARGET_G
+    assert abs(force.pressure_kpa).max() < PRESSURE_TARGET_KPA
+
+
+def test_the_specimen_bends_otherwise_than_the_model_says(short_run: VirtualRun) -> None:
+    from rig.mechanics.model import predict
+
+    setup = make_request().setup
+    points = [p for p in short_run.reader.points() if p.key.target_kpa == 10.0]
+    response = predict(setup.actuator, setup.material, "beam", [0.0, 10e3])
+    model_deg = float(response.angle[-1]) * 57.29577951308232
+    measured = next(p.value for p in points if p.key.experiment == "deformation")
+    assert measured is not None
+    assert abs(measured - model_deg) > 1.0
+
+
+def test_the_same_seed_gives_the_same_points(short_run: VirtualRun, tmp_path: Path) -> None:
+    again = take(tmp_path / "run", make_request())
+    assert again.reader.points() == short_run.reader.points()
+
+
+def test_another_seed_gives_other_points(short_run: VirtualRun, tmp_path: Path) -> None:
+    other = take(tmp_path / "run", make_request(seed=2))
+    assert other.reader.points()[1].value != short_run.reader.points()[1].value
+
+
+def test_a_replay_computes_exactly_the_recorded_points(short_run: VirtualRun) -> None:
+    replayed = ReplayedRun(short_run.folder)
+    assert replayed.points() == short_run.reader.points()
+    assert replayed.angle_readings() == short_run.reader.angle_readings()
+
+
+def test_the_bench_is_vented_at_the_end(short_run: VirtualRun) -> None:
+    assert abs(short_run.truth()[-1].pressure_kpa) < 0.01
+    assert short_run.reader.telemetry("HEARTBEAT")["valve_open"][-1] == 1
+
+
+class StopsAfter(Nobody):
+    """Asks to stop when so many points are done, like a person who presses Ctrl-C."""
+
+    def __init__(self, points: int) -> None:
+        self._left = points
+
+    def point_done(self, point: PointDocument) -> None:
+        self._left -= 1
+
+    def check(self) -> None:
+        if self._left <= 0:
+            raise AbortedError("stopped on request.")
+
+
+def test_an_interrupted_run_is_vented_readable_and_resumable(
+    short_run: VirtualRun, tmp_path: Path
+) -> None:
+    stopper = StopsAfter(4)
+    request = make_request()
+    run = take(tmp_path / "run", request, observer=stopper, interrupted=stopper.check)
+    assert run.outcome.stop.exit_status == "aborted"
+    assert abs(run.truth()[-1].pressure_kpa) < 0.01
+    assert run.reader.complete
+    assert len(run.reader.points()) == 4
+
+    resumed = take_rest(run.folder, request)
+    assert resumed.outcome.stop.exit_status == "success"
+    assert keys(resumed) == keys(short_run)
+    assert [note.points_kept for note in resumed.reader.resumes()] == [4]
+    # the descending point was taken up again over the top pressure, so its branch is the same
+    whole, rest = short_run.reader.points()[4], resumed.reader.points()[4]
+    assert whole.value is not None
+    assert rest.value is not None
+    assert rest.value == pytest.approx(whole.value, abs=0.5)
+
+
+@pytest.mark.parametrize(
+    ("faults", "code"),
+    [
+        (Faults(sensor_open=True), "sensor_open"),
+        (Faults(sensor_short=True), "sensor_short"),
+        (Faults(hx711_silent=True), "hx711_timeout"),
+        (Faults(emergency_stop=True), "emergency_stop"),
+        (Faults(leak_factor=2000.0), "leak"),
+    ],
+)
+def test_a_fault_ends_the_run_vented_with_its_points_kept(
+    faults: Faults, code: str, tmp_path: Path
+) -> None:
+    benches: list[VirtualBench] = []
+
+    class Breaks(Nobody):
+        def point_done(self, point: PointDocument) -> None:
+            if point.key.target_kpa == 5.0:
+                benches[0].plant.set_faults(faults)
+
+    run = take(
+        tmp_path / "run", make_request(), observer=Breaks(), prepare=lambda b: benches.append(b)
+    )
+    assert run.outcome.stop.exit_status == "failed"
+    assert isinstance(run.outcome.error, BoardFaultError)
+    assert run.outcome.error.code == code
+    assert len(run.reader.points()) == 2
+    assert abs(run.truth()[-1].pressure_kpa) < 0.05
+
+
+def test_a_killed_run_keeps_its_points_and_can_be_resumed(
+    short_run: VirtualRun, tmp_path: Path
+) -> None:
+    folder = tmp_path / "run"
+    script = textwrap.dedent(
+        """
+        import os, signal, sys
+        from pathlib import Path
+        from rig.experiment.bench import Nobody
+        from tests.experiment.conftest import make_request, take
+
+        class Killed(Nobody):
+            count = 0
+            def point_done(self, point):
+                Killed.count += 1
+            def point_began(self, key):
+                if Killed.count == 3:
+                    os.kill(os.getpid(), signal.SIGKILL)
+
+        take(Path(sys.argv[1]), make_request(), observer=Killed())
+        """
+    )
+    process = subprocess.run(
+        [sys.executable, "-c", script, str(folder)],
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        check=False,
+    )
+    assert process.returncode == -signal.SIGKILL, process.stderr.decode()
+    killed = RunReader(folder)
+    assert not killed.complete
+    assert killed.points() == short_run.reader.points()[:3]
+
+    resumed = take_rest(folder, make_request())
+    assert resumed.outcome.stop.exit_status == "success"
+    assert keys(resumed) == keys(short_run)
+    assert len(resumed.reader.resumes()) == 1
