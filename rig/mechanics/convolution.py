@@ -12,11 +12,11 @@ keeps the wall smooth and the symmetry lines of trough and crest normal to it
 where beta' is the tilt of the flank and alpha the angle between the two symmetry lines (0 in a
 straight bellow, Theta / (2 N) in a bent one), and closes on the width that is asked for
 
-    u - v tan(alpha / 2) = width,
+    u - slope v = width,
 
 with u, v the extents from trough to crest along and across the trough's tangent. In a straight
-bellow this says that the half-length is `width`; in a bent one that the mean of the trough's and
-the crest's distance from the centre of curvature is `width / (2 tan(alpha / 2))`.
+bellow `slope` is 0 and `width` the half-length; in a bent one they say at which distance from the
+centre of curvature the convolution sits (`rig.mechanics.profile`).
 """
 
 from __future__ import annotations
@@ -79,20 +79,21 @@ class Unfolded:
     stretch: Array
 
 
-def unfold(half: HalfConvolution, width: ArrayLike, wedge: ArrayLike = 0.0) -> Unfolded:
+def unfold(
+    half: HalfConvolution, width: ArrayLike, wedge: ArrayLike = 0.0, slope: ArrayLike = 0.0
+) -> Unfolded:
     """Solve the closure equations for `width` in metres and the wedge angle alpha in rad.
 
     Beyond complete unfolding the arcs stay at `UNFOLDED` and all lengths stretch alike, so that
     the answer is continuous for every width.
     """
-    width, wedge = np.broadcast_arrays(
-        np.asarray(width, dtype=float), np.asarray(wedge, dtype=float)
+    width, wedge, slope = np.broadcast_arrays(
+        *(np.asarray(value, dtype=float) for value in (width, wedge, slope))
     )
-    slope = np.tan(wedge / 2)
     lowest = UNFOLDED + np.maximum(-wedge, 0.0)
     u, v = _extents(half, lowest, wedge)
     stretched = u - slope * v < width
-    angle = np.where(stretched, lowest, _trough_angle(half, width, wedge, lowest))
+    angle = np.where(stretched, lowest, _trough_angle(half, width, wedge, slope, lowest))
     u, v = _extents(half, angle, wedge)
     stretch = np.where(stretched, width / (u - slope * v), 1.0)
     return Unfolded(
@@ -117,9 +118,10 @@ def _extents(half: HalfConvolution, angle: Array, wedge: Array) -> tuple[Array, 
     return u, v
 
 
-def _trough_angle(half: HalfConvolution, width: Array, wedge: Array, lowest: Array) -> Array:
-    """Root of u - v tan(wedge / 2) = width, falling with the angle: Newton kept in a bracket."""
-    slope = np.tan(wedge / 2)
+def _trough_angle(
+    half: HalfConvolution, width: Array, wedge: Array, slope: Array, lowest: Array
+) -> Array:
+    """Root of u - slope v = width, whose left side falls: Newton's method kept in a bracket."""
     low, high = lowest, np.full_like(width, _FOLDED)
     angle = np.full_like(width, QUARTER)
     for _ in range(_MAX_ITERATIONS):

@@ -5,10 +5,14 @@ The interface is the same for beam theory and finite elements; the virtual speci
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from rig.mechanics.errors import MechanicsError
 
 Array = NDArray[np.float64]
 
@@ -34,6 +38,71 @@ class Response:
     max_von_mises: Array | None = None
     """Largest von Mises stress in Pa, tip free."""
 
+    def at(self, pressure: ArrayLike) -> Response:
+        """Response at other pressures in Pa, (m,), by monotone cubic interpolation (PCHIP).
+
+        Raises MechanicsError outside the pressures that the model answered for.
+        """
+        wanted = np.atleast_1d(np.asarray(pressure, dtype=float))
+        low, high = float(self.pressure[0]), float(self.pressure[-1])
+        slack = 1e-12 * max(abs(low), abs(high))
+        if not np.all((wanted >= low - slack) & (wanted <= high + slack)):  # also catches NaN
+            raise MechanicsError(
+                f"the response of model '{self.model}' covers {low / 1e3:.4g} to "
+                f"{high / 1e3:.4g} kPa; {wanted.min() / 1e3:.4g} to {wanted.max() / 1e3:.4g} kPa "
+                f"was asked for. Predict over a wider range of pressures."
+            )
+        interpolate = self._interpolator(np.clip(wanted, low, high))
+        return Response(
+            model=self.model,
+            pressure=wanted,
+            angle=interpolate(self.angle),
+            displacement=interpolate(self.displacement),
+            blocked_force=None if self.blocked_force is None else interpolate(self.blocked_force),
+            volume=interpolate(self.volume),
+            max_von_mises=None if self.max_von_mises is None else interpolate(self.max_von_mises),
+        )
+
+    def pressure_for(self, quantity: Literal["angle", "volume"], values: ArrayLike) -> Array:
+        """Pressures in Pa, (m,), at which `quantity` has `values` (rad or m3): the inverse of `at`.
+
+        Raises MechanicsError where the quantity does not grow with pressure or never gets there.
+        """
+        wanted = np.atleast_1d(np.asarray(values, dtype=float))
+        known: Array = getattr(self, quantity)
+        if known.size < 2 or np.any(np.diff(known) <= 0):
+            raise MechanicsError(
+                f"the {quantity} of model '{self.model}' does not grow all the way with pressure, "
+                f"so it cannot be controlled. Ask by pressure."
+            )
+        outside = wanted[~((wanted >= known[0]) & (wanted <= known[-1]))]
+        if outside.size:
+            shown, unit = (np.degrees, "deg") if quantity == "angle" else (_millilitres, "mL")
+            raise MechanicsError(
+                f"model '{self.model}' reaches {shown(known[0]):.4g} to {shown(known[-1]):.4g} "
+                f"{unit} between {self.pressure[0] / 1e3:.4g} and {self.pressure[-1] / 1e3:.4g} "
+                f"kPa; {shown(outside[0]):.4g} {unit} is outside. Ask for less, or widen the "
+                f"range of pressures."
+            )
+        from scipy.interpolate import PchipInterpolator
+
+        curve = PchipInterpolator(self.pressure, known)
+        roots = [curve.solve(value, extrapolate=False) for value in wanted]
+        # an end value may miss its own polynomial by round-off: the end is the answer then
+        return np.array(
+            [
+                found[0] if found.size else self.pressure[np.argmin(np.abs(known - value))]
+                for found, value in zip(roots, wanted, strict=True)
+            ]
+        )
+
+    def _interpolator(self, pressure: Array) -> Callable[[Array], Array]:
+        if self.pressure.size == 1:
+            return lambda values: np.full_like(pressure, values[0])
+        from scipy.interpolate import PchipInterpolator
+
+        return lambda values: np.asarray(PchipInterpolator(self.pressure, values)(pressure))
+
 
 @dataclass(frozen=True)
 class SideProfile:
@@ -41,10 +110,14 @@ class SideProfile:
 
     Coordinates: x along the undeformed axis away from the connector's soft-side face (x = -t),
     z from the bottom layer towards the crests; origin on the revolving axis where the cavity
-    begins. Positive bending curls the tip towards -z.
+    begins. Positive bending curls the tip towards -z. Counter-clockwise with x right and z up.
     """
 
     connector: Array
     bellow: Array
     bottom_layer: Array
     end_cap: Array
+
+
+def _millilitres(volume: float) -> float:
+    return volume * 1e6

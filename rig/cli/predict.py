@@ -1,0 +1,180 @@
+"""`rig predict`: what the models say about an actuator, as a table and as CSV."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rig.cli.app import app
+
+if TYPE_CHECKING:
+    from rig.mechanics.response import Array, Response
+    from rig.mechanics.table import Row
+    from rig.spec.actuator import ActuatorSpec
+
+MAX_ROWS = 100_000
+
+
+class Control(StrEnum):
+    """The quantity that is prescribed."""
+
+    PRESSURE = "pressure"
+    ANGLE = "angle"
+    VOLUME = "volume"
+
+
+@app.command()
+def predict(
+    actuator: Annotated[
+        Path, typer.Option(help="actuator spec, as models/actuators/bellow-bending.yaml")
+    ],
+    model: Annotated[
+        str | None,
+        typer.Option(help="models, separated by commas; default: the spec's predictions"),
+    ] = None,
+    pressures: Annotated[
+        str | None,
+        typer.Option(help="START:STOP:STEP in kPa; default: 0:10:1, up to the actuator's limit"),
+    ] = None,
+    control: Annotated[
+        Control, typer.Option(help="what is prescribed; angle and volume search `--pressures`")
+    ] = Control.PRESSURE,
+    targets: Annotated[
+        str | None,
+        typer.Option(help="START:STOP:STEP of the prescribed angle in deg or volume in mL"),
+    ] = None,
+    csv: Annotated[Path | None, typer.Option(help="write the table to this file, too")] = None,
+) -> None:
+    """Predict angle, length difference, blocked force and cavity volume of an actuator.
+
+    Nothing moves: this only computes.
+
+    Example: `rig predict --actuator models/actuators/bellow-bending.yaml --csv beam.csv`
+
+    Which pressures bend it by 0 to 90 degrees:
+    `rig predict --actuator SPEC --control angle --targets 0:90:10`
+    """
+    from rig.mechanics.model import predict as predict_response
+    from rig.mechanics.table import rows
+    from rig.spec.loading import load_actuator
+    from rig.spec.workspace import Workspace
+
+    spec = load_actuator(actuator)
+    material = Workspace.find(actuator).material(spec.material)
+    grid = _pressure_grid(spec, pressures)
+    wanted = _target_grid(control, targets)
+    table = []
+    for name in _models(spec, model):
+        response = predict_response(spec, material, name, grid)
+        table += rows(response if wanted is None else _controlled(response, control, wanted))
+    _show(spec.name, material.name, table)
+    if csv is not None:
+        _write(csv, table)
+
+
+def _models(spec: ActuatorSpec, model: str | None) -> list[str]:
+    """Names in the order given, each once; an empty text is an unknown model."""
+    names = spec.predictions if model is None else [name.strip() for name in model.split(",")]
+    return list(dict.fromkeys(names))
+
+
+def _pressure_grid(spec: ActuatorSpec, text: str | None) -> Array:
+    import numpy as np
+
+    from rig.spec.protocol import PressureSteps
+
+    if text is not None:
+        return _grid(text, "Pa", "kPa", "--pressures")
+    usual = np.array(PressureSteps().values())
+    limit = spec.limits.pressure
+    return usual if usual[-1] <= limit else np.append(usual[usual < limit], limit)
+
+
+def _target_grid(control: Control, text: str | None) -> Array | None:
+    if (control is Control.PRESSURE) != (text is None):
+        raise typer.BadParameter(
+            "give --targets START:STOP:STEP together with --control angle or --control volume; "
+            "with --control pressure the pressures come from --pressures."
+        )
+    if text is None:
+        return None
+    si, lab = ("rad", "deg") if control is Control.ANGLE else ("m**3", "mL")
+    return _grid(text, si, lab, "--targets")
+
+
+def _controlled(response: Response, control: Control, values: Array) -> Response:
+    if control is Control.ANGLE:
+        return response.at(response.pressure_for("angle", values))
+    return response.at(response.pressure_for("volume", values))
+
+
+def _grid(text: str, si: str, lab: str, option: str) -> Array:
+    """`0:10:1`, `0:10:1 kPa` or a single value as an array in SI units, both ends included."""
+    import numpy as np
+
+    from rig.spec.quantity import to_si
+
+    parts = [part.strip() for part in text.split(":")]
+    unit = parts[-1].lstrip("+-.0123456789eE/").strip() or lab
+    try:
+        values = [to_si(_with_unit(part, unit), si) for part in parts]
+    except ValueError as error:
+        raise typer.BadParameter(
+            f"{error}; {option} wants START:STOP:STEP in {lab}, as '0:10:1 {lab}'."
+        ) from None
+    if len(values) == 1:
+        return np.array(values)
+    count = (values[1] - values[0]) / values[2] if len(values) == 3 and values[2] > 0 else -1
+    if not 0 < count < MAX_ROWS or abs(count - round(count)) > 1e-6:
+        raise typer.BadParameter(
+            f"'{text}' is no range; {option} wants START:STOP:STEP in {lab} with a whole number "
+            f"of steps below {MAX_ROWS}, as '0:10:1'."
+        )
+    return np.asarray(values[0] + values[2] * np.arange(round(count) + 1), dtype=float)
+
+
+def _with_unit(part: str, unit: str) -> str:
+    bare = not part.lstrip("+-.0123456789eE/").strip()
+    return f"{part} {unit}" if bare else part
+
+
+def _show(actuator: str, material: str, table: list[Row]) -> None:
+    from itertools import compress
+
+    from rich.console import Console
+    from rich.table import Table
+
+    from rig.mechanics.table import COLUMNS
+
+    shown = Table(title=f"{actuator}, {material}")
+    given = [any(row[i] is not None for row in table) for i in range(len(COLUMNS))]
+    for name in compress(COLUMNS, given):
+        quantity, _, unit = name.rpartition("_")
+        heading = f"{quantity.replace('_', ' ')}\n{unit}" if quantity else name
+        shown.add_column(heading, justify="right" if quantity else "left")
+    for model, *values in table:
+        cells = (model, *("" if value is None else f"{value:.3f}" for value in values))
+        shown.add_row(*compress(cells, given))
+    Console().print(shown)
+
+
+def _write(path: Path, table: list[Row]) -> None:
+    import csv
+
+    from rig.mechanics.errors import MechanicsError
+    from rig.mechanics.table import COLUMNS
+
+    try:
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(COLUMNS)
+            for model, *values in table:
+                writer.writerow([model, *("" if v is None else f"{v:.10g}" for v in values)])
+    except OSError as error:
+        raise MechanicsError(
+            f"the table cannot be written to {path}: {error.strerror}. Name a file in an "
+            f"existing folder that you may write to."
+        ) from None

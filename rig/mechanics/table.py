@@ -1,0 +1,44 @@
+"""Responses as the table that `rig predict` prints and writes: field units, one row a pressure."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rig.mechanics.response import Array, Response
+
+COLUMNS = (
+    "model",
+    "pressure_kpa",
+    "angle_deg",
+    "displacement_mm",
+    "blocked_force_g",
+    "volume_ml",
+    "max_von_mises_kpa",
+)
+
+GRAM_FORCE = 9.80665e-3
+"""Newtons in a gram-force."""
+
+
+Row = tuple[str, *tuple[float | None, ...]]
+"""Model name and its figures, in the order of `COLUMNS`."""
+
+
+def rows(response: Response) -> list[Row]:
+    """One row a pressure in the order of `COLUMNS`; None where the model has no such quantity."""
+    columns = (
+        response.pressure / 1e3,
+        np.degrees(response.angle),
+        response.displacement * 1e3,
+        _scaled(response.blocked_force, 1 / GRAM_FORCE),
+        response.volume * 1e6,
+        _scaled(response.max_von_mises, 1e-3),
+    )
+    return [
+        (response.model, *(None if column is None else float(column[i]) for column in columns))
+        for i in range(response.pressure.size)
+    ]
+
+
+def _scaled(values: Array | None, factor: float) -> Array | None:
+    return None if values is None else values * factor
