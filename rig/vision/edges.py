@@ -22,6 +22,7 @@ from rig.vision.tone import to_light
 RUN_TOLERANCE_PX = 2.0  # outline pixels are quantised, jagged by noise, bent by the lens
 MIN_RUN_PX = 8.0
 MAX_RUNS = 3  # both long sides of a rectangle, and what may contradict them
+LONG_SHARE = 0.4  # of the first run: shorter ones are ends and fragments, not long edges
 MAX_GAP_PX = 6.0
 MAX_OUTLINE_POINTS = 160
 CHORD_STARTS = 40
@@ -36,6 +37,7 @@ PLATEAU_PX = 1.5  # length of the profile ends that define the two colours
 COLOUR_WINDOW = 9  # edge points over which those colours are averaged
 MIN_CONTRAST = 20.0  # grey levels between part and surroundings
 MIN_POINTS = 8
+THICKNESS_SAMPLES = 15
 PIXEL_FLOOR_PX = 0.03  # end-to-end error left by sampling and JPEG, seen on synthetic edges
 WIDTH_10_90 = 2.563  # sigmas of a blurred step between 10 % and 90 %
 
@@ -75,7 +77,7 @@ def long_edges(
 
 
 def straight_runs(outline: FloatArray, width: int, height: int) -> list[FloatArray]:
-    """Longest straight stretches of a closed pixel outline (n, 2), at most `MAX_RUNS`.
+    """Long straight stretches of a closed pixel outline (n, 2), at most `MAX_RUNS`.
 
     Consensus in the manner of RANSAC, but with every chord of a few spans as hypothesis instead
     of random ones, so that the same frame always gives the same lines: the stretch with most
@@ -86,8 +88,7 @@ def straight_runs(outline: FloatArray, width: int, height: int) -> list[FloatArr
     free = (
         (thin[:, 0] > 1) & (thin[:, 1] > 1) & (thin[:, 0] < width - 2) & (thin[:, 1] < height - 2)
     )
-    spacing = float(np.median(np.hypot(*np.diff(thin, axis=0).T))) if len(thin) > 1 else 1.0
-    gap = max(1, round(MAX_GAP_PX / max(spacing, 1e-9)))
+    gap = max(1, round(MAX_GAP_PX * len(thin) / len(outline)))
     centres, normals = _chords(thin)
     runs: list[FloatArray] = []
     while len(runs) < MAX_RUNS and len(centres):
@@ -96,12 +97,18 @@ def straight_runs(outline: FloatArray, width: int, height: int) -> list[FloatArr
             centre, direction, _ = plain_line(thin[run], np.ones(len(run)))
             run = _longest(thin, free, centre[None], _normal(direction)[None], gap)
         points = thin[run]
-        if len(points) < 3 or float(np.hypot(*(points[-1] - points[0]))) < MIN_RUN_PX:
+        length = _extent(points)
+        if length < max(MIN_RUN_PX, LONG_SHARE * _extent(runs[0]) if runs else 0.0):
             break
         runs.append(points)
         free = free.copy()
         free[run] = False
     return runs
+
+
+def _extent(run: FloatArray) -> float:
+    """Length of a run from end to end; zero for less than three points."""
+    return float(np.hypot(*(run[-1] - run[0]))) if len(run) >= 3 else 0.0
 
 
 def _chords(outline: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -198,8 +205,9 @@ def _normal(direction: FloatArray) -> FloatArray:
 def _inner_reach(part: BluePart, base: FloatArray, outward: FloatArray) -> float:
     """How far profiles may go into the part: half of its local thickness, 2 to 4 px."""
     depths = np.arange(1.0, 2.0 * REACH_IN_PX + 1.0)
-    grid = (base[:, None, :] - depths[None, :, None] * outward).reshape(-1, 2)
-    inside = part.contains(grid).reshape(len(base), len(depths))
+    some = base[:: max(1, len(base) // THICKNESS_SAMPLES)]
+    grid = (some[:, None, :] - depths[None, :, None] * outward).reshape(-1, 2)
+    inside = part.contains(grid).reshape(len(some), len(depths))
     thickness = float(np.median(np.minimum.accumulate(inside, axis=1).sum(axis=1)))
     return float(np.clip(round(thickness) / 2.0, 2.0, REACH_IN_PX))
 

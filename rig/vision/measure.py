@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from rig.spec.calibration import CameraCalibration, RulerCalibration
-from rig.vision.edges import Edge, long_edges
+from rig.vision.edges import LONG_SHARE, Edge, long_edges
 from rig.vision.errors import UntrustedFrameError, VisionError
 from rig.vision.lines import FloatArray
 from rig.vision.plane import PicturePlane, rectify
@@ -26,8 +26,6 @@ Side = Literal["left", "right"]
 BLEEDING_FACTOR = 1.4
 """An edge this much wider than the best one of its part is no blurred step: the part's colour
 bleeds into the translucent body there. The edges of the rigid front face do not bleed."""
-LONG_SHARE = 0.4
-"""Edges shorter than this share of a part's best one are fragments, not its long edges."""
 BLEEDING_DRIFT = 0.4
 """Drift from end to end of an edge within its extra width, as a share of it: the standard
 deviation of the difference of two uniform deviates."""
@@ -267,7 +265,7 @@ class AngleMeter:
             )
         widths = np.array([edge.width_px for edge in edges])
         sharp = widths <= max(BLEEDING_FACTOR * widths[best], widths[best] + 1.0)
-        long = lengths >= LONG_SHARE * lengths[best]
+        long = lengths >= LONG_SHARE * lengths[best]  # the best need not be the longest
         chosen = np.flatnonzero((np.abs(apart) <= limit) & sharp & long)
         weight = 1.0 / u[chosen] ** 2
         mean = float(weight @ apart[chosen] / weight.sum())

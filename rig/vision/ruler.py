@@ -160,11 +160,10 @@ def _centres(image: Image, rough: FloatArray, radius: float) -> FloatArray:
     x, y = np.broadcast_arrays(columns - rough[:, 0, None, None], rows - rough[:, 1, None, None])
     away = np.hypot(x, y)
     paper = (away > radius + PAPER_PX[0]) & (away < radius + PAPER_PX[1])
-    terms = np.stack([np.ones_like(x), x, y], axis=-1)
-    weighted = terms * paper[..., None]
-    normal = np.einsum("nyxi,nyxj->nij", weighted, terms)
-    white = np.linalg.solve(normal, np.einsum("nyxi,nyx->ni", weighted, light)[..., None])
-    missing = 1.0 - light / np.maximum((terms @ white[:, None])[..., 0], 1.0)
+    terms = np.stack([np.ones_like(x), x, y], axis=-1).reshape(len(rough), -1, 3)
+    weighted = (terms * paper.reshape(len(rough), -1, 1)).mT
+    white = np.linalg.solve(weighted @ terms, weighted @ light.reshape(len(rough), -1, 1))
+    missing = 1.0 - light / np.maximum((terms @ white).reshape(light.shape), 1.0)
     missing[away > radius + PAPER_PX[0]] = 0.0
     total = np.maximum(missing.sum(axis=(1, 2)), 1.0)
     pull = np.stack([(missing * x).sum(axis=(1, 2)), (missing * y).sum(axis=(1, 2))], axis=1)
