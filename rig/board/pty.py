@@ -5,6 +5,7 @@ Any SLCAN program can open it; here wall time is the point, so it is read at thi
 
 from __future__ import annotations
 
+import contextlib
 import os
 import pty
 import select
@@ -47,10 +48,9 @@ class PtyServer:
             return b""
 
     def _write(self, data: bytes) -> None:
-        try:
+        # when nobody reads, bytes are lost as on a serial line
+        with contextlib.suppress(BlockingIOError):
             os.write(self._master, data)
-        except BlockingIOError:
-            pass  # nobody reads: a serial line loses bytes as well
 
     def close(self) -> None:
         """Release the pseudo-terminal."""

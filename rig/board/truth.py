@@ -64,7 +64,7 @@ class TruthFile:
     def close(self) -> None:
         """Finish the file."""
         if self._stream is not None:
-            self._writer.finish()
+            self._writer.finish()  # type: ignore[no-untyped-call]
             self._stream.close()
 
 

@@ -38,7 +38,7 @@ def read_angle(meter: AngleMeter, jpeg: bytes, key: PointKey, frame: int) -> Ang
             accepted=False,
             reason="the frame is no readable picture",
         )
-    result = meter.measure(image)
+    result = meter.measure(np.asarray(image, np.uint8))
     return AngleReading(
         key=key,
         frame=frame,
