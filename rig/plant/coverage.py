@@ -39,6 +39,15 @@ class Box(NamedTuple):
         """True if it holds no pixel."""
         return self.right <= self.left or self.bottom <= self.top
 
+    def on_grid(self, pitch: int, picture: Box) -> Box:
+        """This box grown to multiples of `pitch`, cut at the borders of `picture`."""
+        return Box(
+            max(self.left // pitch * pitch, picture.left),
+            max(self.top // pitch * pitch, picture.top),
+            min(-(-self.right // pitch) * pitch, picture.right),
+            min(-(-self.bottom // pitch) * pitch, picture.bottom),
+        )
+
     def within(self, outer: Box) -> Box:
         """This box in the coordinates of the top left pixel of `outer`."""
         return Box(
@@ -67,8 +76,8 @@ def coverage(outline: Array, box: Box) -> Picture:
     """Share of each pixel of `box` that lies inside the closed `outline`, float32 in 0..1.
 
     `outline` is (n, 2) in pixels, integers at pixel centres, without a repeated last point;
-    either sense of rotation. It may leave the box on any side. Regions that it encloses more
-    than once count once.
+    either sense of rotation. It may leave the box on any side. Pixels that it encloses more than
+    once are covered once; where its own borders overlap, they are added up to one.
     """
     rows, columns = box.shape
     if box.empty:

@@ -112,6 +112,8 @@ class Scene:
         bar = [project(_bar(place(profile.end_cap)))] if occluded else []
         seen = bounding_box(parts + bar, self._reach, self._whole)
         box = bounding_box(parts + bar, 2 * self._reach, self._whole)
+        # On one grid for all frames, so that the coarse shading does not flicker.
+        box = box.on_grid(_COARSE, self._whole)
         picture = self._still.copy()
         if seen.empty:
             return picture
@@ -235,6 +237,8 @@ def _bar(cap: Array) -> Array:
 
 def _add_light(light: Picture, colour: Picture, weight: Picture) -> None:
     """Add `weight` (rows, columns) times `colour` (3,) to `light` (3, rows, columns) in place."""
+    if weight.size == 0:
+        return
     for plane, level in zip(light, colour.tolist(), strict=True):
         cv2.scaleAdd(weight, level, plane, dst=plane)
 
