@@ -1,0 +1,56 @@
+"""Whole commands in wall time: `rig --help`, and the default characterisation stage by stage.
+
+Targets: help below 0.5 s, the default run below 60 s of which the bench's part at more than
+100 times real time.
+"""
+
+from __future__ import annotations
+
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from rig.report.build import build_report
+
+from rig.record.reader import RunReader
+
+ROOT = Path(__file__).resolve().parents[2]
+RIG = [sys.executable, "-c", "from rig.cli.main import main; main()"]
+HELP_RUNS = 7
+
+
+def seconds(command: list[str]) -> float:
+    """Wall time of a command that must succeed."""
+    start = time.perf_counter()
+    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+    return time.perf_counter() - start
+
+
+def main() -> None:
+    """Print the table."""
+    helps = [seconds([*RIG, "--help"]) for _ in range(HELP_RUNS)]
+    with tempfile.TemporaryDirectory() as scratch:
+        run = Path(scratch) / "run"
+        actuator = "models/actuators/bellow-bending.yaml"
+        whole_s = seconds([*RIG, "characterise", "--actuator", actuator, "--out", str(run)])
+        bench_s = float(RunReader(run).telemetry("HEARTBEAT")["time_s"][-1])
+        start = time.perf_counter()
+        build_report(run)
+        report_s = time.perf_counter() - start
+    rows = [
+        ("rig --help, median", f"{statistics.median(helps):.2f} s", "0.5 s"),
+        ("rig characterise, default protocol", f"{whole_s:.1f} s", "60 s"),
+        ("  of which report", f"{report_s:.1f} s", ""),
+        ("  bench time", f"{bench_s / 60:.1f} min", ""),
+        (
+            "  bench time / wall time without report",
+            f"{bench_s / (whole_s - report_s):.0f}",
+            "100",
+        ),
+    ]
+    print("{:<44}{:>12}{:>10}".format("command", "measured", "target"))
+    for row in rows:
+        print("{:<44}{:>12}{:>10}".format(*row))
