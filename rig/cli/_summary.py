@@ -1,0 +1,31 @@
+"""The outcome of a run on the terminal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from rig.report.summary import RunSummary
+
+
+def show_summary(console: Console, summary: RunSummary, folder: Path) -> None:
+    """Print each model's error beside the published one, and where the report is."""
+    table = Table("experiment", "points", "model", "RMSE", "bias", "largest error")
+    for name, experiment in summary.experiments.items():
+        points = f"{experiment.measured} of {experiment.planned}"
+        unit = experiment.unit
+        if not experiment.models:
+            table.add_row(name, points, "-", "-", "-", "-")
+        for model, result in experiment.models.items():
+            table.add_row(
+                name,
+                points,
+                model,
+                f"{result.rmse.value:.3g} ± {result.rmse.u95:.2g} {unit}",
+                f"{result.bias.value:+.3g} {unit}",
+                f"{result.max_error.value:.3g} {unit} at {result.max_error.pressure_kpa:g} kPa",
+            )
+    console.print(table)
+    console.print(f"status: {summary.status}; report: {folder / 'report.html'}", soft_wrap=True)
