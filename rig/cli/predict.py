@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 MAX_ROWS = 100_000
 
+_UNITS = {"kpa": "kPa", "ml": "mL"}
+
 
 class Control(StrEnum):
     """The quantity that is prescribed."""
@@ -153,7 +155,7 @@ def _show(actuator: str, material: str, table: list[Row]) -> None:
     given = [any(row[i] is not None for row in table) for i in range(len(COLUMNS))]
     for name in compress(COLUMNS, given):
         quantity, _, unit = name.rpartition("_")
-        heading = f"{quantity.replace('_', ' ')}\n{unit}" if quantity else name
+        heading = f"{quantity.replace('_', ' ')}\n{_UNITS.get(unit, unit)}" if quantity else name
         shown.add_column(heading, justify="right" if quantity else "left")
     for model, *values in table:
         cells = (model, *("" if value is None else f"{value:.3f}" for value in values))
