@@ -97,42 +97,27 @@ def side_profile(geometry: BellowBendingGeometry, angle: float) -> SideProfile:
     symmetry line of the trough. Near the ends the troughs stay as high as in the middle.
     """
     shape = BellowShape.of(geometry)
-    below, top = shape.underside, shape.end_wall_top
-    wall, tip = shape.wall, shape.tip
-    x, height = _outer_surface(shape, angle)
-    along = np.linspace(0.0, shape.effective_length, _BOTTOM_POINTS)
-    along = np.concatenate([[-wall], along, [shape.effective_length + wall]])
-    wall_height = np.array([top - below])
-    floor = wrap(shape, angle, along, shape.bottom_thickness)
+    wall, length, tip = shape.wall, shape.effective_length, shape.tip
+    top = shape.end_wall_top - shape.underside
+    along = np.concatenate([[-wall], np.linspace(0.0, length, _BOTTOM_POINTS), [length + wall]])
+    surface_x, surface_height = _outer_surface(shape, angle)
+    # material coordinates of all bent parts, placed together: one call costs less than four
+    parts = [
+        (along, np.zeros_like(along)),
+        (along, np.full_like(along, shape.bottom_thickness)),
+        (np.array([length + wall, length]), np.array([top, top])),
+        (surface_x[::-1], surface_height[::-1]),
+        (np.array([0.0, -wall]), np.array([top, top])),
+        (np.array([length + wall, tip, tip, length + wall]), np.array([0.0, 0.0, top, top])),
+    ]
+    x, height = (np.concatenate(column) for column in zip(*parts, strict=True))
+    placed = wrap(shape, angle, x, height)
+    floor, cap = along.size, placed.shape[0] - 4
     return SideProfile(
-        connector=np.array(
-            [
-                [-wall - shape.connector_thickness, below],
-                [-wall, below],
-                [-wall, top + wall],
-                [-wall - shape.connector_thickness, top + wall],
-            ]
-        ),
-        bellow=np.concatenate(
-            [
-                floor,
-                wrap(
-                    shape,
-                    angle,
-                    np.concatenate([[along[-1]], [along[-2]], x[::-1], [0.0], [-wall]]),
-                    np.concatenate(
-                        [wall_height, wall_height, height[::-1], wall_height, wall_height]
-                    ),
-                ),
-            ]
-        ),
-        bottom_layer=np.concatenate([wrap(shape, angle, along, 0.0), floor[::-1]]),
-        end_cap=wrap(
-            shape,
-            angle,
-            np.array([along[-1], tip, tip, along[-1]]),
-            np.array([0.0, 0.0, top - below, top - below]),
-        ),
+        connector=_connector(shape),
+        bellow=placed[floor:cap],
+        bottom_layer=np.concatenate([placed[:floor], placed[2 * floor - 1 : floor - 1 : -1]]),
+        end_cap=placed[cap:],
     )
 
 
@@ -152,6 +137,12 @@ def cavity_volume(geometry: BellowBendingGeometry, angle: ArrayLike) -> Array:
     lever = curvature[..., np.newaxis]
     density = section.area * (1 + lever * axis) + lever * section.moment
     return np.asarray(2 * shape.bellow_number * np.sum(density * weight, axis=-1))
+
+
+def _connector(shape: BellowShape) -> Array:
+    near, far = -shape.wall - shape.connector_thickness, -shape.wall
+    bottom, top = shape.underside, shape.end_wall_top + shape.wall
+    return np.array([[near, bottom], [far, bottom], [far, top], [near, top]])
 
 
 def _curved(angle: ArrayLike) -> Array:
