@@ -35,6 +35,8 @@ class CameraFault(Enum):
 class SensorNoise:
     """Independent normal noise of standard deviation `sd` grey levels, rounded to whole levels.
 
+    It is added to a picture that is already in whole levels: their rounding, up to half a level
+    and fixed for a pixel, does not average out over frames (it moves edges by 0.02 pixels at most).
     One field larger than the picture is drawn beforehand; every frame reads it from an offset and
     mirrored as drawn from the seed and the frame's time. Noise is therefore the same whenever
     the same moment is rendered, and two frames share a pattern once in some 37,000 pairs.

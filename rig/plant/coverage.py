@@ -39,14 +39,28 @@ class Box(NamedTuple):
         """True if it holds no pixel."""
         return self.right <= self.left or self.bottom <= self.top
 
+    def grown(self, margin: int) -> Box:
+        """This box with `margin` more pixels on all sides."""
+        return Box(self.left - margin, self.top - margin, self.right + margin, self.bottom + margin)
+
+    def common(self, other: Box) -> Box:
+        """The pixels of both; empty boxes have no width or no height."""
+        left, top = max(self.left, other.left), max(self.top, other.top)
+        return Box(
+            left,
+            top,
+            max(min(self.right, other.right), left),
+            max(min(self.bottom, other.bottom), top),
+        )
+
     def on_grid(self, pitch: int, picture: Box) -> Box:
         """This box grown to multiples of `pitch`, cut at the borders of `picture`."""
         return Box(
-            max(self.left // pitch * pitch, picture.left),
-            max(self.top // pitch * pitch, picture.top),
-            min(-(-self.right // pitch) * pitch, picture.right),
-            min(-(-self.bottom // pitch) * pitch, picture.bottom),
-        )
+            self.left // pitch * pitch,
+            self.top // pitch * pitch,
+            -(-self.right // pitch) * pitch,
+            -(-self.bottom // pitch) * pitch,
+        ).common(picture)
 
     def within(self, outer: Box) -> Box:
         """This box in the coordinates of the top left pixel of `outer`."""
@@ -62,14 +76,9 @@ def bounding_box(outlines: list[Array], margin: int, picture: Box) -> Box:
     """The pixels of `picture` that `outlines` (each (n, 2), pixels) touch, and `margin` more."""
     low = np.min([outline.min(axis=0) for outline in outlines], axis=0)
     high = np.max([outline.max(axis=0) for outline in outlines], axis=0)
-    left, top = (int(v) - margin for v in np.floor(low + 0.5))
-    right, bottom = (int(v) + margin for v in np.ceil(high + 0.5))
-    return Box(
-        min(max(left, picture.left), picture.right),
-        min(max(top, picture.top), picture.bottom),
-        min(max(right, picture.left), picture.right),
-        min(max(bottom, picture.top), picture.bottom),
-    )
+    left, top = (int(v) for v in np.floor(low + 0.5))
+    right, bottom = (int(v) for v in np.ceil(high + 0.5))
+    return Box(left, top, right, bottom).grown(margin).common(picture)
 
 
 def coverage(outline: Array, box: Box) -> Picture:

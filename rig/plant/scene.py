@@ -88,16 +88,22 @@ class Scene:
         self._projection = projection
         self._layout = layout
         self._blur = blur
+        self._pixel = projection.distance / projection.focal[0]  # metres
         self._reach = int(np.ceil(4 * blur)) + 1
         self._whole = Box(0, 0, projection.width, projection.height)
         self._light = light.field(projection.width, projection.height)
         self._connector = self._cover(layout.place(connector), self._whole)
+        pixels = projection.project(layout.place(connector))
+        self._connector_box = bounding_box([pixels], 1, self._whole).on_grid(_COARSE, self._whole)
+        self._connector_glow = self._glow(
+            self._connector[self._connector_box.slices], self._connector_box
+        )
+        self._connector_light = self._connector * self._light * RIGID_BLUE[:, None, None]
         self._ground = self._static_light(ruler, rng) * self._light
         """Linear light (3, height, width) of all that stands still but the connector."""
-        blue = self._connector * self._light * RIGID_BLUE[:, None, None]
         # Planes for one frame: fresh memory for each would cost more than the arithmetic.
-        self._scratch = np.empty((8, projection.height * projection.width), np.float32)
-        self._still = self._developed(self._ground * (1 - self._connector) + blue)
+        self._scratch = np.empty((6, projection.height * projection.width), np.float32)
+        self._still = self._developed(self._ground * (1 - self._connector) + self._connector_light)
 
     def picture(self, profile: SideProfile, occluded: bool = False) -> Image:
         """The picture (height, width, 3), BGR, 8 bit, without noise, of the deformed actuator.
@@ -131,51 +137,64 @@ class Scene:
         parts adjoin and where one hides the other.
         """
         scratch = self._scratch[:, : box.shape[0] * box.shape[1]].reshape(-1, *box.shape)
-        seen, (left, rigid, body, brightness, bleed) = scratch[:3], scratch[3:]
+        seen, (left, brightness, soft) = scratch[:3], scratch[3:]
         light = self._light[box.slices]
-        rigid[:] = self._connector[box.slices]
-        np.subtract(1, rigid, out=left)
+        np.subtract(1, self._connector[box.slices], out=left)
         weights = []
         for outline in parts:
             part = bounding_box([outline], 0, box)
-            here = part.within(box).slices
             weight = coverage(outline, part)
+            here = part.within(box).slices
             np.minimum(weight, left[here], out=weight)
             left[here] -= weight
-            weights.append((here, weight))
-        (cap_here, cap), *soft = weights
-        rigid[cap_here] += cap
-        np.subtract(1, left, out=body)
-        self._shade(body, rigid, brightness, bleed)
+            weights.append((part, weight))
+        self._relief(left, out=brightness)
         brightness *= light
-        rigid *= light
 
         np.multiply(self._ground[:, *box.slices], left, out=seen)
-        _add_light(seen, RIGID_BLUE, rigid)
-        for (here, weight), colour in zip(soft, (BOTTOM_LAYER, BODY), strict=True):
+        still = self._connector_box.common(box)
+        seen[:, *still.within(box).slices] += self._connector_light[:, *still.slices]
+        (cap_box, cap), *soft_parts = weights
+        cap_glow = self._glow(cap, cap_box)
+        cap *= self._light[cap_box.slices]
+        _add_light(seen[:, *cap_box.within(box).slices], RIGID_BLUE, cap)
+        soft[:] = 0
+        for (part, weight), colour in zip(soft_parts, (BOTTOM_LAYER, BODY), strict=True):
+            here = part.within(box).slices
             weight *= brightness[here]
+            soft[here] += weight
             _add_light(seen[:, *here], colour, weight)
-            weight *= bleed[here]
-            _add_light(seen[:, *here], BLEEDING, weight)
+        for lit, glow in (cap_glow, self._connector_glow):
+            part = lit.common(box)
+            here = part.within(box).slices
+            _add_light(seen[:, *here], BLEEDING, soft[here] * glow[part.within(lit).slices])
         return seen
 
-    def _shade(self, body: Picture, rigid: Picture, brightness: Picture, bleed: Picture) -> None:
-        """Write the brightness of the soft body and the share of rigid colour shining into it.
-
-        `body` is the coverage of the whole actuator, `rigid` that of its rigid parts.
-        """
-        rows, columns = body.shape
-        coarse = (max(columns // _COARSE, 1), max(rows // _COARSE, 1))
-        pixel = self._projection.distance / self._projection.focal[0] * _COARSE
-        thick = cv2.resize(body, coarse, interpolation=cv2.INTER_AREA)
-        thick = cv2.GaussianBlur(thick, (0, 0), _RELIEF / pixel)
+    def _relief(self, left: Picture, out: Picture) -> None:
+        """Write the brightness of the soft body; `left` is the share of pixels without any part."""
+        rows, columns = left.shape
+        thick = 1 - cv2.resize(left, _coarse(left), interpolation=cv2.INTER_AREA)
+        thick = cv2.GaussianBlur(thick, (0, 0), _RELIEF / self._pixel / _COARSE)
         # Lit from the upper right: a slope towards the light is brighter.
         slope = np.roll(thick, (1, -1), (0, 1)) - np.roll(thick, (-1, 1), (0, 1))
         relief = np.clip(0.62 + 0.42 * thick**2 - 0.55 * slope, 0.3, 1.25)
-        cv2.resize(relief, (columns, rows), dst=brightness)
-        near = cv2.resize(rigid, coarse, interpolation=cv2.INTER_AREA)
-        near = cv2.GaussianBlur(near, (0, 0), _BLEED / pixel)
-        cv2.resize(near, (columns, rows), dst=bleed)
+        cv2.resize(relief, (columns, rows), dst=out)
+
+    def _glow(self, weight: Picture, box: Box) -> tuple[Box, Picture]:
+        """How much of a rigid part shines into its surroundings, and where these are.
+
+        `weight` is the part's coverage of the pixels of `box`.
+        """
+        reach = int(3 * _BLEED / self._pixel)
+        around = box.grown(reach).on_grid(_COARSE, self._whole)
+        glow = np.zeros(around.shape, np.float32)
+        if box.empty:
+            return around, glow
+        glow[box.within(around).slices] = weight
+        near = cv2.resize(glow, _coarse(glow), interpolation=cv2.INTER_AREA)
+        near = cv2.GaussianBlur(near, (0, 0), _BLEED / self._pixel / _COARSE)
+        cv2.resize(near, glow.shape[::-1], dst=glow)
+        return around, glow
 
     def _developed(self, light: Picture) -> Image:
         """8-bit BGR of linear light (3, rows, columns): point spread, then tone curve."""
@@ -233,6 +252,11 @@ def _bar(cap: Array) -> Array:
     corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * (0.013, 0.020)
     bar: Array = cap.mean(axis=0) + corners
     return bar
+
+
+def _coarse(plane: Picture) -> tuple[int, int]:
+    """Width and height of a plane at the resolution of the shading."""
+    return max(plane.shape[1] // _COARSE, 1), max(plane.shape[0] // _COARSE, 1)
 
 
 def _add_light(light: Picture, colour: Picture, weight: Picture) -> None:
