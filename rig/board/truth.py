@@ -14,6 +14,7 @@ from mcap.writer import CompressionType, Writer
 
 from rig.plant.plant import GRAVITY, Truth
 
+LOG_FILE = "run.mcap"
 SCHEMA = {
     "type": "object",
     "title": "truth",
@@ -28,17 +29,14 @@ SCHEMA = {
 
 
 class TruthFile:
-    """Writes truth samples to an MCAP file, from the moment its folder is there.
-
-    The folder is made by the run's own log, which must find it empty.
-    """
+    """Writes truth samples to an MCAP file, from the moment the run's own log stands beside it."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self._stream: BinaryIO | None = None
 
     def _begin(self) -> None:
-        self._stream = self._path.open("xb")
+        self._stream = self._path.open("wb")
         self._writer = Writer(self._stream, chunk_size=1 << 18, compression=CompressionType.ZSTD)
         self._writer.start(profile="", library="rig truth")
         schema = self._writer.register_schema(
@@ -49,7 +47,7 @@ class TruthFile:
     def write(self, time_s: float, truth: Truth) -> None:
         """Add a sample at bench time `time_s`."""
         if self._stream is None:
-            if not self._path.parent.is_dir():
+            if not self._path.with_name(LOG_FILE).exists():
                 return
             self._begin()
         stamp = round(time_s * 1e9)

@@ -22,6 +22,7 @@ from rig.experiment.run import RunOutcome, new_run, resume_run
 from rig.experiment.setup import RunRequest
 from rig.mechanics.profile import cavity_volume
 from rig.record.reader import RunReader
+from rig.record.writer import require_free_folder
 from rig.spec.bench import VirtualBoard
 from rig.spec.workspace import Setup, Workspace
 
@@ -65,6 +66,7 @@ class Session:
     def run(self, out: Path | None) -> int:
         """Take the whole run; returns the exit code of the command."""
         folder = out or self._free_folder()
+        require_free_folder(folder)
         bench = self._open(folder, segment=0, start_s=0.0)
         return self._take(
             folder,

@@ -6,6 +6,7 @@ on a real port it waits, on a virtual board it advances firmware and bench toget
 
 from __future__ import annotations
 
+import time
 from typing import TYPE_CHECKING, Protocol
 
 from rig.link import slcan
@@ -109,10 +110,7 @@ class PythonCanBus:
     """Frames over a python-can bus: socketcan, pcan, slcan, ...; bench time is the bus's clock."""
 
     def __init__(self, bus: can.BusABC) -> None:
-        import time
-
         self._bus = bus
-        self._clock = time.monotonic
         self._start_s = time.monotonic()
 
     @property
@@ -123,7 +121,7 @@ class PythonCanBus:
     @property
     def now_s(self) -> float:
         """Seconds since the bus was wrapped."""
-        return self._clock() - self._start_s
+        return time.monotonic() - self._start_s
 
     def send(self, frame_id: int, payload: bytes) -> None:
         """Send a standard data frame."""

@@ -91,20 +91,14 @@ class RunWriter:
         `attachments` are files by name (specs, calibrations, DBC, firmware identity); `units` are
         those of the telemetry. Raises RecordError if the folder is taken or cannot be written.
         """
+        require_free_folder(folder)
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            taken = next(folder.iterdir(), None)
         except OSError as error:
             raise RecordError(
                 f"{folder}: no run folder can be made here: {error.strerror}. Choose another "
                 f"folder with --out."
             ) from error
-        if taken is not None:
-            raise RecordError(
-                f"{folder}: the folder is not empty ({taken.name} is in it) and a run never "
-                f"overwrites anything. Choose another folder with --out, or continue the run "
-                f"that is there with `rig resume {folder}`."
-            )
         lock = FolderLock(folder)
         try:
             stream = (folder / LOG_FILE).open("xb")
@@ -315,6 +309,22 @@ class RunWriter:
         channel_id = self._log.register(topic, "json", document_schema(type(document)))
         data = document.model_dump_json(exclude_none=True).encode()
         self._log.add(topic, channel_id, times_to_ns((time_s,)), [data])
+
+
+def require_free_folder(folder: Path) -> None:
+    """Raise RecordError unless a new run may be recorded in `folder`: it is absent or empty."""
+    try:
+        taken = next(folder.iterdir(), None) if folder.exists() else None
+    except OSError as error:
+        raise RecordError(
+            f"{folder}: this is no folder for a run: {error.strerror}. Choose another with --out."
+        ) from error
+    if taken is not None:
+        raise RecordError(
+            f"{folder}: the folder is not empty ({taken.name} is in it) and a run never "
+            f"overwrites anything. Choose another folder with --out, or continue the run "
+            f"that is there with `rig resume {folder}`."
+        )
 
 
 def _cut(path: Path, found: Scan, keep_points: int | None) -> tuple[int, int]:

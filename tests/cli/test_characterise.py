@@ -1,0 +1,134 @@
+"""The main command: dry run, run, outputs, exit codes, and the same report twice."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from rig.record.reader import RunReader
+
+from .conftest import ROOT, Command
+
+ACTUATOR = "models/actuators/bellow-bending.yaml"
+
+
+@pytest.fixture(scope="module")
+def quick_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("runs") / "quick"
+    characterise(folder).check_returncode()
+    return folder
+
+
+def characterise(
+    folder: Path, *more: str, protocol: str = "quick"
+) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "rig", "characterise", "--actuator", ACTUATOR]
+    return subprocess.run(
+        [*command, "--protocol", protocol, "--out", str(folder), *more],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_a_dry_run_prints_the_plan_and_moves_nothing(rig: Command, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    outcome = rig("characterise", "--actuator", ACTUATOR, "--out", out, "--dry-run")
+    assert outcome.code == 0
+    assert "120 points" in outcome.out
+    assert "min of bench time" in outcome.out
+    assert "nothing was moved" in outcome.out
+    assert not out.exists()
+
+
+def test_a_run_leaves_everything_the_contract_names(quick_run: Path) -> None:
+    names = {path.name for path in quick_run.iterdir()}
+    assert {"run.mcap", "summary.json", "report.html", "points.csv", "truth.mcap"} <= names
+    summary = json.loads((quick_run / "summary.json").read_text())
+    assert summary["status"] == "success"
+    assert summary["actuator"] == "bellow-bending"
+    assert summary["seed"] == 1
+    for unit, experiment in (("deg", "deformation"), ("g", "blocked_force")):
+        found = summary["experiments"][experiment]
+        assert found["models"]["beam"]["rmse"]["unit"] == unit
+        assert found["models"]["beam"]["rmse"]["value"] > 0
+        assert [level["repeats"] for level in found["points"] if level["direction"] == "up"] == [
+            2,
+            2,
+            2,
+        ]
+
+
+def test_the_report_is_one_file_without_outside_references(quick_run: Path) -> None:
+    html = (quick_run / "report.html").read_text()
+    assert "<html" in html
+    for outside in ('src="http', 'href="http', "url(http", "@import"):
+        assert outside not in html
+
+
+def test_the_report_does_not_know_the_truth(quick_run: Path) -> None:
+    assert "truth" not in (quick_run / "summary.json").read_text()
+    assert RunReader(quick_run).counts().keys().isdisjoint({"/truth"})
+
+
+def test_the_same_seed_gives_the_same_report_to_the_byte(quick_run: Path, tmp_path: Path) -> None:
+    # in a folder of the same name, since the report says how to make it again
+    again = tmp_path / quick_run.name
+    characterise(again).check_returncode()
+    for name in ("summary.json", "report.html", "points.csv"):
+        assert (again / name).read_bytes() == (quick_run / name).read_bytes(), name
+
+
+def test_a_replay_from_the_log_alone_gives_the_same_summary(
+    rig: Command, quick_run: Path, tmp_path: Path
+) -> None:
+    log = tmp_path / "run.mcap"
+    log.write_bytes((quick_run / "run.mcap").read_bytes())
+    outcome = rig("replay", log, "--out", tmp_path / "replayed")
+    assert outcome.code == 0
+    assert "exactly as they were taken" in outcome.out
+    replayed = (tmp_path / "replayed" / "summary.json").read_bytes()
+    assert replayed == (quick_run / "summary.json").read_bytes()
+
+
+def test_a_complete_run_has_nothing_to_resume(rig: Command, quick_run: Path) -> None:
+    outcome = rig("resume", quick_run)
+    assert outcome.code != 0
+    assert "complete" in outcome.err
+
+
+def test_ctrl_c_vents_closes_the_log_and_says_how_to_go_on(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "rig", "characterise", "--actuator", ACTUATOR, "--out", str(folder)],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env={**os.environ, "COLUMNS": "200"},
+    )
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline and not _has_points(folder):
+        time.sleep(0.2)
+    process.send_signal(signal.SIGINT)
+    said, _ = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "aborted" in said
+    assert f"rig resume {folder}" in said.replace("\n", " ")
+    reader = RunReader(folder)
+    assert reader.complete
+    assert reader.telemetry("HEARTBEAT")["valve_open"][-1] == 1
+    assert json.loads((folder / "summary.json").read_text())["status"] == "aborted"
+
+
+def _has_points(folder: Path) -> bool:
+    log = folder / "run.mcap"
+    return log.exists() and log.stat().st_size > 2_000_000
