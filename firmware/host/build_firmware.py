@@ -1,7 +1,7 @@
 """Builds the extension `rig.board._firmware`: the firmware core with the host HAL, by cffi.
 
-setuptools runs it from the root of the source tree. `python firmware/host/build_firmware.py`
-compiles into rig/board of this tree.
+setuptools runs it from the root of the source tree; `python setup.py build_ext --inplace` compiles
+in place.
 """
 
 from __future__ import annotations
@@ -55,20 +55,3 @@ ffibuilder.set_source(
     depends=[*relative(f"{CORE}/**/*.[hc]"), *relative(f"{HOST}/*.h")],
     extra_compile_args=compiler_arguments(),
 )
-
-
-def build_in_place() -> None:
-    """Compile into rig/board, with everything else below build/."""
-    from setuptools import Distribution
-
-    os.chdir(ROOT)
-    distribution = Distribution({"ext_modules": [ffibuilder.distutils_extension("build/cffi")]})
-    command = distribution.get_command_obj("build_ext")
-    command.inplace = True
-    command.build_temp = "build/temp"
-    command.ensure_finalized()
-    command.run()
-
-
-if __name__ == "__main__":
-    build_in_place()

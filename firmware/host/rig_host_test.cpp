@@ -6,6 +6,7 @@
 #include "e2e.h"
 #include "generated/rig.h"
 #include "hx711.h"
+#include "messages.h"
 #include "parameters.h"
 #include "plunger_motion.h"
 #include "pressure_loop.h"
@@ -15,6 +16,11 @@
 namespace {
 
 constexpr bool kAtRest = true;
+
+void finish(rig::CanFrame frame, uint8_t alive, uint8_t *payload) {
+  rig::protect(frame, alive);
+  memcpy(payload, frame.data, 8);
+}
 
 }  // namespace
 
@@ -29,6 +35,65 @@ void rig_test_protect(uint16_t id, uint8_t alive, uint8_t *payload) {
   memcpy(frame.data, payload, 8);
   rig::protect(frame, alive);
   memcpy(payload, frame.data, 8);
+}
+
+void rig_test_pack_heartbeat(uint8_t alive, uint8_t state, uint8_t fault, uint8_t number,
+                             uint8_t result, uint8_t reset_cause, uint8_t flags,
+                             uint16_t uptime_s, uint8_t *payload) {
+  const auto flag = [flags](int bit) { return (flags >> bit & 1) != 0; };
+  finish(rig::pack(rig::Heartbeat{static_cast<rig::State>(state), static_cast<rig::Fault>(fault),
+                                  number, static_cast<rig::CommandResult>(result), reset_cause,
+                                  flag(0), flag(1), flag(2), flag(3), flag(4), flag(5), flag(6),
+                                  flag(7), uptime_s}),
+         alive, payload);
+}
+
+void rig_test_pack_pressure(uint8_t alive, int plausible, int saturated, float pressure_kpa,
+                            float setpoint_kpa, float plunger_ml, uint8_t *payload) {
+  finish(rig::pack(rig::PressureReport{plausible != 0, saturated != 0, rig::kpa(pressure_kpa),
+                                       rig::kpa(setpoint_kpa), rig::ml(plunger_ml)}),
+         alive, payload);
+}
+
+void rig_test_pack_controller(uint8_t alive, float velocity_ml_s, float integral_ml_s,
+                              float transducer_v, uint8_t *payload) {
+  finish(rig::pack(rig::ControllerReport{rig::ml_s(velocity_ml_s), rig::ml_s(integral_ml_s),
+                                         rig::volts(transducer_v)}),
+         alive, payload);
+}
+
+void rig_test_pack_load_cell(uint8_t alive, uint8_t status, int32_t counts, uint16_t sample,
+                             uint8_t *payload) {
+  finish(rig::pack(
+             rig::LoadCellReport{static_cast<rig::LoadCellStatus>(status), counts, sample}),
+         alive, payload);
+}
+
+void rig_test_pack_fault(uint8_t alive, uint8_t code, float value, float age_s, uint8_t *payload) {
+  finish(rig::pack(rig::FaultReport{static_cast<rig::Fault>(code), value, rig::seconds(age_s)}),
+         alive, payload);
+}
+
+void rig_test_pack_parameter(uint8_t alive, uint8_t result, uint8_t number, uint8_t index,
+                             float value, uint8_t *payload) {
+  finish(rig::pack(rig::ParameterReport{static_cast<rig::ParameterResult>(result), number, index,
+                                        value}),
+         alive, payload);
+}
+
+void rig_test_pack_identity(uint8_t alive, uint8_t board_kind, uint32_t firmware_git,
+                            uint8_t *payload) {
+  finish(rig::pack(rig::IdentityReport{board_kind, firmware_git}), alive, payload);
+}
+
+void rig_test_unpack_command(const uint8_t *payload, uint8_t *opcode, uint8_t *number,
+                             float *argument) {
+  rig::CanFrame frame = {RIG_COMMAND_FRAME_ID, 8, {}};
+  memcpy(frame.data, payload, 8);
+  const rig::Command command = rig::unpack_command(frame);
+  *opcode = static_cast<uint8_t>(command.opcode);
+  *number = command.number;
+  *argument = command.argument;
 }
 
 int32_t rig_test_hx711_counts(uint32_t word) { return rig::hx711_counts(word); }

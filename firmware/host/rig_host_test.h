@@ -20,6 +20,25 @@ uint16_t rig_test_crc16(const uint8_t *data, size_t size);
 /* Fills in CRC and alive counter of an eight-byte payload. */
 void rig_test_protect(uint16_t id, uint8_t alive, uint8_t *payload);
 
+/* Frames as the firmware packs them, with alive counter and CRC; each writes eight bytes. `flags` of
+ * the heartbeat are its eight single bits in the order of rig.dbc. */
+void rig_test_pack_heartbeat(uint8_t alive, uint8_t state, uint8_t fault, uint8_t number,
+                             uint8_t result, uint8_t reset_cause, uint8_t flags,
+                             uint16_t uptime_s, uint8_t *payload);
+void rig_test_pack_pressure(uint8_t alive, int plausible, int saturated, float pressure_kpa,
+                            float setpoint_kpa, float plunger_ml, uint8_t *payload);
+void rig_test_pack_controller(uint8_t alive, float velocity_ml_s, float integral_ml_s,
+                              float transducer_v, uint8_t *payload);
+void rig_test_pack_load_cell(uint8_t alive, uint8_t status, int32_t counts, uint16_t sample,
+                             uint8_t *payload);
+void rig_test_pack_fault(uint8_t alive, uint8_t code, float value, float age_s, uint8_t *payload);
+void rig_test_pack_parameter(uint8_t alive, uint8_t result, uint8_t number, uint8_t index,
+                             float value, uint8_t *payload);
+void rig_test_pack_identity(uint8_t alive, uint8_t board_kind, uint32_t firmware_git,
+                            uint8_t *payload);
+void rig_test_unpack_command(const uint8_t *payload, uint8_t *opcode, uint8_t *number,
+                             float *argument);
+
 int32_t rig_test_hx711_counts(uint32_t word);
 /* Judges `count` words in turn; `status` as load_cell_status of rig.dbc. */
 void rig_test_hx711_judge(const uint32_t *words, size_t count, uint8_t *status);

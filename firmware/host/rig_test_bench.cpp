@@ -17,6 +17,7 @@ constexpr double kAdcCounts = 1024.0;
 constexpr double kReference = 5.0;
 constexpr double kGain = 10.0;    // kPa/V
 constexpr double kOffset = 0.5;   // V
+constexpr double kSwelling = 0.05;  // s, of the actuator after the pressure
 
 rig_test_bench_state defaults() {
   rig_test_bench_state s = {};
@@ -44,6 +45,7 @@ struct rig_test_bench {
   double moles = 0;        // kPa mL per unit of temperature
   double temperature = 1;  // relative to the wall
   double volume = 0;
+  double swell_ml = 0;
   double frozen_volts = kOffset;
   int word_in_ms = 0;
   std::mt19937 random;
@@ -53,15 +55,14 @@ struct rig_test_bench {
 
   void place(double plunger_ml) {
     motor_ml = s.plunger_ml = plunger_ml;
+    swell_ml = 0;
     volume = gas_volume();
     moles = s.ambient_kpa * volume;
     temperature = 1;
     s.pressure_kpa = s.shown_kpa = 0;
   }
 
-  double gas_volume() const {
-    return s.system_ml - s.plunger_ml + s.compliance_ml_kpa * s.pressure_kpa;
-  }
+  double gas_volume() const { return s.system_ml - s.plunger_ml + swell_ml; }
 
   void move(const rig_pins_out &out) {
     s.steps += out.steps;
@@ -76,6 +77,7 @@ struct rig_test_bench {
   }
 
   void breathe(bool valve_open) {
+    swell_ml += (s.compliance_ml_kpa * s.pressure_kpa - swell_ml) * (1 - std::exp(-kStep / kSwelling));
     const double new_volume = gas_volume();
     const double conductance = s.leak_ml_s_kpa + (valve_open ? s.valve_ml_s_kpa : 0.0);
     const double rate = conductance * (s.ambient_kpa + s.pressure_kpa) / new_volume;

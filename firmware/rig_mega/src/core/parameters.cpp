@@ -16,9 +16,9 @@ constexpr bool kAtRest = false;
 // In the order of the schema. The syringe is 26.7 mm wide, the screw's lead 2 mm, 3200 microsteps
 // a revolution: pi/4 * 26.7^2 * 2/3200 = 0.34994 uL a step.
 constexpr ParameterRule kRules[] = {
-    {3.0f, 0.01f, 100.0f, kLive},          // proportional_ml_s_kpa
+    {4.0f, 0.01f, 100.0f, kLive},          // proportional_ml_s_kpa
     {3.0f, 0.0f, 200.0f, kLive},           // integral_ml_s2_kpa
-    {0.9f, 0.0f, 2.0f, kLive},             // feed_forward
+    {1.0f, 0.0f, 2.0f, kLive},             // feed_forward
     {0.008f, 0.0f, 1.0f, kLive},           // deadband_kpa
     {6.0f, 0.05f, 30.0f, kLive},           // max_flow_ml_s
     {40.0f, 1.0f, 1000.0f, kLive},         // max_flow_acceleration_ml_s2
@@ -34,8 +34,8 @@ constexpr ParameterRule kRules[] = {
     {100.0f, 1.0f, 10000.0f, kLive},       // pressure_rate_limit_kpa_s
     {1.0f, 0.25f, 60.0f, kLive},           // communication_timeout_s
     {1.0f, 0.05f, 60.0f, kLive},           // hx711_timeout_s
-    {5.0f, 0.1f, 64.0f, kLive},            // leak_volume_ml
-    {2.0f, 0.1f, 60.0f, kLive},            // stuck_time_s
+    {3.0f, 0.1f, 64.0f, kLive},            // leak_volume_ml
+    {0.2f, 0.05f, 60.0f, kLive},           // stuck_time_s
     {2.0f, 0.0f, 10.0f, kAtRest},          // zero_limit_kpa
     {2.0f, 0.05f, 10.0f, kAtRest},         // homing_flow_ml_s
 };

@@ -79,7 +79,6 @@ void RigCore::watch(const Inputs &inputs) {
 
 // The most immediate danger first. Every monitor runs in every tick, so that none is out of date.
 Finding RigCore::find_fault(const Inputs &inputs) {
-  const State state = safety_.state();
   const Finding pressure = pressure_monitor_.tick(
       transducer_, {inputs.adc_count != 0, !safety_.valve_open(), motion_.position()});
   const Finding cell = load_cell_.tick(parameters_.hx711_timeout());
@@ -87,7 +86,7 @@ Finding RigCore::find_fault(const Inputs &inputs) {
       inputs.emergency_stop ? Finding{Fault::kEmergencyStop, 0.0f} : kNoFinding,
       watch_travel(inputs),
       pressure,
-      state == State::kRun ? watch_regulation() : kNoFinding,
+      safety_.valve_open() ? kNoFinding : watch_regulation(),
       cell,
       watch_host(),
   };
@@ -109,10 +108,10 @@ Finding RigCore::watch_travel(const Inputs &inputs) {
 }
 
 Finding RigCore::watch_regulation() {
-  const bool wants_more = motion_.blocked() > 0 &&
+  const bool wants_more = safety_.state() == State::kRun && motion_.blocked() > 0 &&
                           setpoint_.value() - transducer_.pressure() > parameters_.deadband();
   if (out_of_travel_(wants_more)) return {Fault::kTravelLimit, to_ml(motion_.position())};
-  return leak_monitor_.tick(setpoint_.resting(), motion_.position(), parameters_.leak_volume());
+  return leak_monitor_.tick(motion_.position(), transducer_.pressure(), parameters_.leak_volume());
 }
 
 Finding RigCore::watch_host() {
@@ -143,6 +142,7 @@ void RigCore::react_to(const Finding &finding) {
 }
 
 void RigCore::enter(State state) {
+  if (safety_.valve_open()) leak_monitor_.start(motion_.position(), transducer_.pressure());
   safety_.enter(state);
   motion_.seek_home(false);
   motion_.stop();
@@ -237,12 +237,7 @@ CommandResult RigCore::execute(const Command &command) {
     case Opcode::kNone: break;
     case Opcode::kSetPressure: return set_pressure(command.argument);
     case Opcode::kHold: enter(State::kHold); break;
-    case Opcode::kVent:
-      if (safety_.state() == State::kVent) break;
-      enter(State::kVent);
-      outputs_.motor_enabled = true;
-      homing_.go_back(motion_, parameters_);
-      break;
+    case Opcode::kVent: vent(); break;
     case Opcode::kZeroPressure:
       zeroed_ = false;
       zeroing_.begin();
@@ -260,6 +255,16 @@ CommandResult RigCore::execute(const Command &command) {
   return CommandResult::kAccepted;
 }
 
+void RigCore::vent() {
+  const State before = safety_.state();
+  // the valve is open and the plunger on its way home already
+  if (before == State::kHoming) safety_.enter(State::kVent);
+  if (before == State::kHoming || before == State::kVent) return;
+  enter(State::kVent);
+  outputs_.motor_enabled = true;
+  homing_.go_back(motion_, parameters_);
+}
+
 CommandResult RigCore::set_pressure(float target_kpa) {
   if (!is_finite(target_kpa)) return CommandResult::kNotFinite;
   const Pressure target = kpa(target_kpa);
@@ -271,7 +276,6 @@ CommandResult RigCore::set_pressure(float target_kpa) {
   if (safety_.state() != State::kRun) {
     enter(State::kRun);
     loop_.reset();
-    leak_monitor_.reset();
     out_of_travel_.reset();
     setpoint_.start_from(transducer_.pressure());
   }

@@ -15,7 +15,7 @@ constexpr uint8_t kAllowed[] = {
     kAnyButBoot | in(State::kBoot),                                 // none
     kResting | in(State::kRun),                                     // set_pressure
     kResting | in(State::kRun),                                     // hold
-    kResting | in(State::kRun) | in(State::kVent),                  // vent
+    kResting | kSeeking | in(State::kRun),                          // vent
     in(State::kIdle) | in(State::kVent),                            // zero_pressure
     kResting | kSeeking | in(State::kRun),                          // tare
     kResting,                                                       // home
