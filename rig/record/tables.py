@@ -1,0 +1,103 @@
+"""A run's points, angles and pressure as CSV tables; units stand in the headers."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from rig.record.errors import RecordError
+from rig.record.reader import RunReader
+
+TRACE_PERIOD_S = 0.5
+"""Pressure is given as mean, least and largest of pieces this long; the log has every sample."""
+KEY_COLUMNS = ("experiment", "repeat", "direction", "target_kpa")
+
+
+def write_tables(reader: RunReader, folder: Path) -> tuple[Path, ...]:
+    """Write points.csv, angles.csv and pressure.csv into `folder`; returns their paths.
+
+    Raises RecordError if the folder cannot be written.
+    """
+    return (
+        _write(folder / "points.csv", POINT_COLUMNS, _points(reader)),
+        _write(folder / "angles.csv", ANGLE_COLUMNS, _angles(reader)),
+        _write(folder / "pressure.csv", PRESSURE_COLUMNS, _pressure(reader)),
+    )
+
+
+POINT_COLUMNS = (
+    *KEY_COLUMNS,
+    "started_s",
+    "settled_s",
+    "measured_from_s",
+    "measured_to_s",
+    "pressure_kpa",
+    "pressure_sd_kpa",
+    "value",
+    "value_sd",
+    "value_u",
+    "unit",
+    "readings",
+    "rejected",
+)
+ANGLE_COLUMNS = (*KEY_COLUMNS, "frame", "angle_deg", "u_deg", "quality", "accepted", "reason")
+PRESSURE_COLUMNS = ("time_s", "pressure_mean_kpa", "pressure_min_kpa", "pressure_max_kpa")
+
+
+def _points(reader: RunReader) -> Iterable[Sequence[object]]:
+    for p in reader.points():
+        yield (
+            *(p.key.experiment, p.key.repeat, p.key.direction, p.key.target_kpa),
+            *(_time(p.started_s), _time(p.settled_s)),
+            *(_time(p.measured_from_s), _time(p.measured_to_s)),
+            *(_number(p.pressure_kpa), _number(p.pressure_sd_kpa)),
+            *(_number(p.value), _number(p.value_sd), _number(p.value_u)),
+            *(p.unit, p.readings, "; ".join(p.rejected)),
+        )
+
+
+def _angles(reader: RunReader) -> Iterable[Sequence[object]]:
+    for r in reader.angle_readings():
+        yield (
+            *(r.key.experiment, r.key.repeat, r.key.direction, r.key.target_kpa),
+            *(r.frame, _number(r.angle_deg), _number(r.u_deg), _number(r.quality)),
+            *(r.accepted, r.reason),
+        )
+
+
+def _pressure(reader: RunReader) -> Iterable[Sequence[object]]:
+    telemetry = reader.telemetry("PRESSURE")
+    time_s = telemetry["time_s"]
+    if not time_s.size:
+        return
+    order = np.argsort(time_s, kind="stable")
+    piece = np.floor(time_s[order] / TRACE_PERIOD_S).astype(np.int64)
+    starts = np.flatnonzero(np.diff(piece, prepend=piece[0] - 1))
+    pressure = telemetry["pressure_kpa"][order]
+    counts = np.diff(np.append(starts, piece.size))
+    means = np.add.reduceat(pressure, starts) / counts
+    low, high = np.minimum.reduceat(pressure, starts), np.maximum.reduceat(pressure, starts)
+    for row in zip(piece[starts] * TRACE_PERIOD_S, means, low, high, strict=True):
+        yield (f"{row[0]:.1f}", *(f"{value:.4f}" for value in row[1:]))
+
+
+def _time(seconds: float | None) -> str:
+    return "" if seconds is None else f"{seconds:.3f}"
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.6g}"
+
+
+def _write(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> Path:
+    try:
+        with path.open("w", newline="", encoding="utf-8") as stream:
+            writer = csv.writer(stream, lineterminator="\n")
+            writer.writerow(header)
+            writer.writerows(rows)
+    except OSError as error:
+        raise RecordError(f"{path}: the table cannot be written: {error.strerror}.") from error
+    return path

@@ -1,0 +1,540 @@
+"""From a run's points and the models' predictions to its summary."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.control.errors import ControlError
+from rig.control.step import StepMetrics, step_metrics
+from rig.mechanics.response import Response
+from rig.record.documents import Direction, ExitStatus, ExperimentName, PointDocument
+from rig.record.reader import RunReader
+from rig.report.data import EXPERIMENTS, RunData, by_level, load_run, planned_points
+from rig.report.summary import (
+    BudgetLine,
+    ControllerSummary,
+    ExperimentSummary,
+    HysteresisSummary,
+    LevelError,
+    LevelSummary,
+    MaximumError,
+    ModelSummary,
+    Quantity,
+    Reference,
+    ReferenceValue,
+    RepeatabilitySummary,
+    ResumeSummary,
+    RunSummary,
+    StepSummary,
+    ValidationSummary,
+)
+from rig.spec.calibration import TransducerCalibration
+from rig.spec.published import PublishedReference
+from rig.validate.metrics import (
+    ComparisonErrors,
+    Repeatability,
+    ValidationStatement,
+    bias,
+    hysteresis,
+    maximum_error,
+    normalised,
+    repeatability,
+    rmse,
+    validation_statement,
+)
+from rig.validate.uncertainty import Component, Estimate, combine
+
+Array = NDArray[np.float64]
+STANDARD_GRAVITY = 9.80665
+QUANTITIES: dict[ExperimentName, str] = {
+    "deformation": "bending angle",
+    "blocked_force": "blocked force",
+}
+UNITS: dict[ExperimentName, str] = {"deformation": "deg", "blocked_force": "g"}
+INSTRUMENTS: dict[ExperimentName, str] = {
+    "deformation": "camera and vision",
+    "blocked_force": "load cell",
+}
+
+
+def build_summary(
+    reader: RunReader,
+    predictions: Mapping[str, Response],
+    references: Sequence[PublishedReference] = (),
+    notes: Sequence[str] = (),
+) -> RunSummary:
+    """Summarise a run.
+
+    `predictions` are the models' responses over at least the pressures measured; `references` are
+    published figures, of which those for this actuator's family are kept; `notes` say what could
+    not be predicted. Raises RecordError or SpecError for a log without the set-up of a run.
+    """
+    return summarise(load_run(reader), predictions, references, notes)
+
+
+def summarise(
+    data: RunData,
+    predictions: Mapping[str, Response],
+    references: Sequence[PublishedReference] = (),
+    notes: Sequence[str] = (),
+) -> RunSummary:
+    """Summarise a run that was read already; see `build_summary`."""
+    reader = data.reader
+    start, (status, reason) = reader.start(), _ending(reader)
+    experiments = {
+        name: _experiment(name, data, predictions, references)
+        for name in EXPERIMENTS
+        if data.section(name) is not None or data.points_of(name)
+    }
+    return RunSummary(
+        status=status,
+        reason=reason,
+        complete=reader.complete,
+        problem=reader.problem,
+        actuator=start.actuator,
+        material=start.material,
+        bench=start.bench,
+        board=start.board,
+        protocol=start.protocol,
+        seed=start.seed,
+        created=start.created,
+        versions=dict(sorted(start.versions.items())),
+        duration_s=max((point.measured_to_s for point in data.points), default=0.0),
+        resumed=tuple(ResumeSummary.model_validate(note.model_dump()) for note in reader.resumes()),
+        notes=tuple(notes),
+        experiments=experiments,
+    )
+
+
+def _ending(reader: RunReader) -> tuple[ExitStatus, str]:
+    stop = reader.stop()
+    if stop is not None:
+        return stop.exit_status, stop.reason
+    return "failed", f"the run ended without saying so, as when it is killed: {reader.problem}"
+
+
+def predicted_value(response: Response, experiment: ExperimentName) -> Array | None:
+    """What a model says of an experiment, in deg or grams-force; None if it says nothing."""
+    if experiment == "deformation":
+        return np.degrees(response.angle)
+    if response.blocked_force is None:
+        return None
+    return response.blocked_force / STANDARD_GRAVITY * 1e3
+
+
+def _experiment(
+    name: ExperimentName,
+    data: RunData,
+    predictions: Mapping[str, Response],
+    references: Sequence[PublishedReference],
+) -> ExperimentSummary:
+    points = data.points_of(name)
+    levels = _levels(name, points, data.setup.calibrations.transducer)
+    up = [level for level in levels if level.direction == "up"]
+    span = max(v.mean for v in up) - min(v.mean for v in up) if up else None
+    section = data.section(name)
+    return ExperimentSummary(
+        quantity=QUANTITIES[name],
+        unit=UNITS[name],
+        planned=planned_points(section) if section is not None else len(points),
+        measured=len(points),
+        span=span,
+        points=tuple(_level_summary(level, points) for level in levels),
+        repeatability=_repeatability(levels, UNITS[name]),
+        hysteresis=_hysteresis(points, UNITS[name]),
+        controller=_controller(data, points, name),
+        budget=_budget(up, UNITS[name]),
+        models=_models(name, up, predictions, span, data.setup.calibrations.transducer),
+        references=_references(name, data, references),
+    )
+
+
+@dataclass(frozen=True)
+class Level:
+    """The repeats of one pressure on one branch, with the parts of its uncertainty."""
+
+    direction: Direction
+    target_kpa: float
+    points: tuple[PointDocument, ...]
+    components: tuple[Component, ...]
+
+    @property
+    def values(self) -> Array:
+        """Measured values, (repeats,)."""
+        return np.array([point.value for point in self.points], dtype=np.float64)
+
+    @property
+    def pressures_kpa(self) -> Array:
+        """Measured pressures, (repeats,)."""
+        return np.array([point.pressure_kpa for point in self.points])
+
+    @property
+    def mean(self) -> float:
+        """Mean of the repeats."""
+        return float(self.values.mean())
+
+    @property
+    def estimate(self) -> Estimate:
+        """The mean with its combined uncertainty."""
+        return combine(self.mean, self.components)
+
+
+def _levels(
+    name: ExperimentName, points: Sequence[PointDocument], transducer: TransducerCalibration
+) -> list[Level]:
+    groups = by_level(points)
+    measured = {
+        key: np.array([p.value for p in group], dtype=np.float64) for key, group in groups.items()
+    }
+    pooled = repeatability(list(measured.values()))
+    means = {key: float(values.mean()) for key, values in measured.items()}
+    levels = []
+    for (direction, target), group in groups.items():
+        branch = {kpa: mean for (way, kpa), mean in means.items() if way == direction}
+        slope = _slope(branch, target)
+        components = [
+            _repeats(measured[direction, target], group, pooled),
+            Component(INSTRUMENTS[name], _calibration_u(group)),
+        ]
+        for source, u_kpa in pressure_uncertainty(transducer, target).items():
+            components.append(Component(source, abs(slope) * u_kpa))
+        way: Direction = "up" if direction == "up" else "down"
+        levels.append(Level(way, target, tuple(group), tuple(components)))
+    return levels
+
+
+def _repeats(
+    values: Array, group: Sequence[PointDocument], pooled: Repeatability | None
+) -> Component:
+    """Type A: from the repeats; for a single one from the scatter of the repeats elsewhere.
+
+    Where nothing was repeated at all only the scatter of the single point's readings is known.
+    """
+    if values.size > 1:
+        return Component(
+            "repeats", float(values.std(ddof=1)) / math.sqrt(values.size), values.size - 1
+        )
+    if pooled is not None:
+        return Component("repeats", pooled.sd, pooled.dof)
+    (point,) = group
+    u = point.value_sd / math.sqrt(max(1, point.readings))
+    return Component("readings (nothing was repeated)", u, max(1, point.readings - 1))
+
+
+def _calibration_u(group: Sequence[PointDocument]) -> float:
+    """Type B part of the points' uncertainty: it is common to the repeats."""
+    squares = [max(0.0, p.value_u**2 - p.value_sd**2 / max(1, p.readings)) for p in group]
+    return math.sqrt(float(np.mean(squares)))
+
+
+def pressure_uncertainty(
+    transducer: TransducerCalibration, pressure_kpa: float
+) -> dict[str, float]:
+    """Standard uncertainties in kPa of a measured pressure, by source; all of type B."""
+    return {
+        "pressure: zero": transducer.zero_u / 1e3,
+        "pressure: gain": transducer.gain_u * pressure_kpa,
+        "pressure: linearity": transducer.linearity_u / 1e3,
+    }
+
+
+def _slope(branch: Mapping[float, float], target: float) -> float:
+    """Slope of a measured branch at one of its pressures, in its unit per kPa."""
+    if len(branch) < 2:
+        return 0.0
+    kpa = np.array(sorted(branch))
+    slopes = np.gradient(np.array([branch[p] for p in kpa]), kpa)
+    return float(slopes[np.searchsorted(kpa, target)])
+
+
+def _level_summary(level: Level, points: Sequence[PointDocument]) -> LevelSummary:
+    here = [
+        p
+        for p in points
+        if p.key.direction == level.direction and p.key.target_kpa == level.target_kpa
+    ]
+    values = level.values
+    return LevelSummary(
+        pressure_kpa=level.target_kpa,
+        direction=level.direction,
+        measured_pressure_kpa=float(level.pressures_kpa.mean()),
+        mean=level.mean,
+        sd=float(values.std(ddof=1)) if values.size > 1 else None,
+        u95=level.estimate.u95,
+        repeats=values.size,
+        readings=sum(p.readings for p in here),
+        rejected=sum(len(p.rejected) for p in here),
+    )
+
+
+def _repeatability(levels: Sequence[Level], unit: str) -> RepeatabilitySummary | None:
+    found = repeatability([level.values for level in levels])
+    if found is None:
+        return None
+    return RepeatabilitySummary(
+        sd=found.sd, low=found.low, high=found.high, limit=found.limit, unit=unit
+    )
+
+
+def _hysteresis(points: Sequence[PointDocument], unit: str) -> HysteresisSummary | None:
+    """Of the sweeps that went both ways, mean of the branches."""
+    both = {p.key.repeat for p in points if p.key.direction == "down"}
+    groups = by_level(p for p in points if p.key.repeat in both)
+    kpa = sorted({pressure for _, pressure in groups})
+
+    def branch(direction: str) -> Array:
+        values = [
+            np.array([p.value for p in groups.get((direction, pressure), [])], dtype=np.float64)
+            for pressure in kpa
+        ]
+        return np.array([v.mean() if v.size else np.nan for v in values])
+
+    found = hysteresis(branch("up"), branch("down")) if kpa else None
+    if found is None:
+        return None
+    return HysteresisSummary(
+        difference=found.difference,
+        percent_of_span=found.percent_of_span,
+        pressure_kpa=kpa[found.level],
+        unit=unit,
+    )
+
+
+def steps(
+    data: RunData, points: Sequence[PointDocument]
+) -> list[tuple[PointDocument, StepMetrics]]:
+    """Metrics of the pressure loop on the way to each point; points without a trace left out."""
+    found = []
+    for point in points:
+        section = data.section(point.key.experiment)
+        tolerance_kpa = section.settling.tolerance / 1e3 if section is not None else 0.05
+        trace = data.trace.between(point.started_s, point.measured_to_s)
+        settled_s = point.started_s if point.settled_s is None else point.settled_s
+        try:
+            metrics = step_metrics(
+                trace.time_s,
+                trace.pressure_kpa,
+                point.key.target_kpa,
+                tolerance_kpa,
+                # The later half of the hold: what is left there is no part of the approach.
+                steady_from_s=(settled_s + point.measured_to_s) / 2,
+            )
+        except ControlError:
+            continue
+        found.append((point, metrics))
+    return found
+
+
+def _controller(
+    data: RunData, points: Sequence[PointDocument], name: ExperimentName
+) -> ControllerSummary | None:
+    found = steps(data, points)
+    section = data.section(name)
+    if not found or section is None:
+        return None
+    metrics = [m for _, m in found]
+    settled = [m.settling_time_s for m in metrics if m.settling_time_s is not None]
+    return ControllerSummary(
+        tolerance_kpa=section.settling.tolerance / 1e3,
+        unsettled=len(metrics) - len(settled),
+        worst_settling_time_s=max(settled, default=None),
+        worst_overshoot_kpa=max(m.overshoot for m in metrics),
+        worst_steady_error_kpa=max((m.steady_error for m in metrics), key=abs),
+        worst_noise_kpa=max(m.noise for m in metrics),
+        steps=tuple(
+            StepSummary(
+                repeat=point.key.repeat,
+                direction=point.key.direction,
+                initial_kpa=m.initial,
+                target_kpa=m.target,
+                rise_time_s=m.rise_time_s,
+                settling_time_s=m.settling_time_s,
+                overshoot_kpa=m.overshoot,
+                overshoot_percent=m.overshoot_percent,
+                steady_error_kpa=m.steady_error,
+                noise_kpa=m.noise,
+            )
+            for point, m in found
+        ),
+    )
+
+
+def _budget(levels: Sequence[Level], unit: str) -> tuple[BudgetLine, ...]:
+    """Contributions to the uncertainty of the ascending means, each over all levels."""
+    by_source: dict[str, list[Component]] = {}
+    for level in levels:
+        for component in level.components:
+            by_source.setdefault(component.name, []).append(component)
+    variances = {
+        source: sum(c.u**2 for c in parts) / len(levels) for source, parts in by_source.items()
+    }
+    total = sum(variances.values())
+    return tuple(
+        BudgetLine(
+            source=source,
+            kind="A" if math.isfinite(parts[0].dof) else "B",
+            rms=math.sqrt(variances[source]),
+            largest=max(c.u for c in parts),
+            share_percent=100 * variances[source] / total if total else 0.0,
+            unit=unit,
+        )
+        for source, parts in by_source.items()
+    )
+
+
+def _models(
+    name: ExperimentName,
+    levels: Sequence[Level],
+    predictions: Mapping[str, Response],
+    span: float | None,
+    transducer: TransducerCalibration,
+) -> dict[str, ModelSummary]:
+    return {
+        model: _model(name, levels, ModelCurve(response, name), span or 0.0, transducer)
+        for model, response in predictions.items()
+        if levels and predicted_value(response, name) is not None
+    }
+
+
+@dataclass(frozen=True)
+class ModelCurve:
+    """A model's prediction for one experiment as a function of pressure in kPa.
+
+    Outside the response's range the ends count: the noise of a pressure may lie just outside.
+    """
+
+    response: Response
+    experiment: ExperimentName
+
+    def value(self, pressures_kpa: Array) -> Array:
+        """Prediction in deg or grams-force, the shape of `pressures_kpa`."""
+        predicted = predicted_value(self.response.at(self._inside(pressures_kpa)), self.experiment)
+        assert predicted is not None
+        return predicted
+
+    def slope(self, pressure_kpa: float) -> float:
+        """Its slope in deg or grams-force per kPa."""
+        around = self._inside(np.array([pressure_kpa - 0.05, pressure_kpa + 0.05])) / 1e3
+        low, high = self.value(around)
+        return float((high - low) / (around[1] - around[0]))
+
+    def _inside(self, pressures_kpa: Array) -> Array:
+        pressures = self.response.pressure
+        return np.clip(pressures_kpa * 1e3, pressures[0], pressures[-1])
+
+
+def _model(
+    name: ExperimentName,
+    levels: Sequence[Level],
+    curve: ModelCurve,
+    span: float,
+    transducer: TransducerCalibration,
+) -> ModelSummary:
+    unit = UNITS[name]
+    errors = comparison_errors(levels, curve, transducer, INSTRUMENTS[name])
+    level, largest = maximum_error(errors)
+    root = rmse(errors)
+    statement = validation_statement(errors)
+    predicted = curve.value(np.array([v.pressures_kpa.mean() for v in levels]))
+    return ModelSummary(
+        rmse=_quantity(root, unit),
+        bias=_quantity(bias(errors), unit),
+        max_error=MaximumError(
+            value=largest.value,
+            unit=unit,
+            u95=largest.u95,
+            pressure_kpa=levels[level].target_kpa,
+        ),
+        nrmse=_quantity(normalised(root, span), "%") if span > 0 else None,
+        validation=ValidationSummary(
+            levels=statement.levels,
+            beyond=statement.beyond,
+            coverage=statement.coverage,
+            agrees=statement.agrees,
+            statement=_in_words(statement),
+        ),
+        errors=tuple(
+            LevelError(
+                pressure_kpa=v.target_kpa,
+                predicted=float(p),
+                error=float(e),
+                u_validation=float(u),
+            )
+            for v, p, e, u in zip(levels, predicted, errors.error, errors.u_validation, strict=True)
+        ),
+    )
+
+
+def comparison_errors(
+    levels: Sequence[Level], curve: ModelCurve, transducer: TransducerCalibration, instrument: str
+) -> ComparisonErrors:
+    """Model minus experiment at each level, at the pressures that were really there.
+
+    Calibrations act at all levels together; an error of pressure moves along the model's slope.
+    The models' own inputs (modulus, dimensions) are taken as stated in the specs.
+    """
+    error, u_random, dof = [], [], []
+    common: dict[str, list[float]] = {instrument: []}
+    all_differences = [curve.value(level.pressures_kpa) - level.values for level in levels]
+    pooled = repeatability(all_differences)
+    for level, differences in zip(levels, all_differences, strict=True):
+        repeats = _repeats(differences, level.points, pooled)
+        error.append(float(differences.mean()))
+        u_random.append(repeats.u)
+        dof.append(repeats.dof)
+        common[instrument].append(_calibration_u(level.points))
+        slope = curve.slope(float(level.pressures_kpa.mean()))
+        for source, u_kpa in pressure_uncertainty(transducer, level.target_kpa).items():
+            common.setdefault(source, []).append(slope * u_kpa)
+    return ComparisonErrors(
+        error=np.array(error),
+        u_random=np.array(u_random),
+        dof=np.array(dof, dtype=np.float64),
+        u_common={source: np.array(u) for source, u in common.items()},
+    )
+
+
+def _quantity(estimate: Estimate, unit: str) -> Quantity:
+    return Quantity(value=estimate.value, unit=unit, u95=estimate.u95)
+
+
+def _in_words(statement: ValidationStatement) -> str:
+    k = f"k = {statement.coverage:g}"
+    if statement.agrees:
+        return (
+            f"at none of {statement.levels} pressures does the model differ from the experiment "
+            f"by more than the expanded validation uncertainty ({k}): any error of the model is "
+            f"below what this experiment resolves"
+        )
+    return (
+        f"at {statement.beyond} of {statement.levels} pressures the model differs from the "
+        f"experiment by more than the expanded validation uncertainty ({k}), by up to "
+        f"{statement.largest_ratio:.3g} times: there the difference is the model's error"
+    )
+
+
+def _references(
+    name: ExperimentName, data: RunData, references: Sequence[PublishedReference]
+) -> tuple[Reference, ...]:
+    family = data.setup.actuator.geometry.family
+    found = []
+    for reference in references:
+        values = tuple(
+            ReferenceValue(
+                model=value.model,
+                statistic=value.statistic,
+                value=value.value,
+                unit=value.unit,
+                where=value.where,
+            )
+            for value in reference.values
+            if value.experiment == name
+        )
+        if values and reference.actuator_family == family:
+            found.append(Reference(citation=reference.citation, note=reference.note, values=values))
+    return tuple(found)

@@ -1,0 +1,97 @@
+"""Builds what people read of a run, from its log alone: summary, tables, report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rig.mechanics.errors import MechanicsError
+from rig.mechanics.model import predict
+from rig.mechanics.response import Response
+from rig.record.reader import RunReader
+from rig.record.tables import write_tables
+from rig.report.analysis import summarise
+from rig.report.data import RunData, load_run
+from rig.report.errors import ReportError
+from rig.report.page import render_report
+from rig.report.summary import RunSummary
+from rig.spec.published import PublishedReference
+from rig.spec.workspace import Workspace, library_root
+
+SUMMARY_FILE = "summary.json"
+REPORT_FILE = "report.html"
+CURVE_POINTS = 101
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """A run, what the models say of it, and the summary of both."""
+
+    data: RunData
+    predictions: dict[str, Response]
+    summary: RunSummary
+
+
+def analyse(reader: RunReader) -> Analysis:
+    """Predict and summarise a run.
+
+    Raises RecordError or SpecError for a log that does not hold the set-up of a run.
+    """
+    data = load_run(reader)
+    predictions, notes = _predictions(data)
+    return Analysis(data, predictions, summarise(data, predictions, _published(), notes))
+
+
+def build_report(folder: Path, reader: RunReader | None = None) -> RunSummary:
+    """Write summary.json, CSV tables and report.html of a run into `folder`.
+
+    The run is that of `reader`, by default the one recorded in `folder`; nothing but its log is
+    read. Raises RecordError or SpecError for a log that does not hold a run, ReportError if the
+    folder cannot be written.
+    """
+    reader = reader or RunReader(folder)
+    analysis = analyse(reader)
+    page = render_report(analysis.data, analysis.summary, analysis.predictions)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_tables(reader, folder)
+        write_text(folder / SUMMARY_FILE, analysis.summary.to_json())
+        write_text(folder / REPORT_FILE, page)
+    except OSError as error:
+        raise ReportError(
+            f"{folder}: the report cannot be written: {error.strerror}. The log is untouched; "
+            f"`rig report` writes the report again."
+        ) from error
+    return analysis.summary
+
+
+def write_text(path: Path, text: str) -> None:
+    """Replace a file as a whole, so that no reader ever sees half of it."""
+    partial = path.with_name(path.name + ".partial")
+    partial.write_text(text, encoding="utf-8", newline="\n")
+    partial.replace(path)
+
+
+def _predictions(data: RunData) -> tuple[dict[str, Response], list[str]]:
+    """The models' responses over the pressures of the run, and why some are missing."""
+    actuator, material = data.setup.actuator, data.setup.material
+    sections = [data.setup.protocol.deformation, data.setup.protocol.blocked_force]
+    asked = max((s.pressures.stop for s in sections if s is not None), default=0.0)
+    top = min(max(asked, data.highest_kpa * 1e3), actuator.limits.pressure)
+    pressures = np.linspace(0.0, top, CURVE_POINTS)
+    found: dict[str, Response] = {}
+    notes: list[str] = []
+    for model in actuator.predictions:
+        try:
+            found[model] = predict(actuator, material, model, pressures)
+        except MechanicsError as error:
+            notes.append(f"There is no prediction of the model {model}: {error}")
+    return found, notes
+
+
+def _published() -> Sequence[PublishedReference]:
+    """Figures of papers in the library that ships with rig."""
+    return Workspace(library_root(), is_library=True).published()
