@@ -39,6 +39,7 @@ MIN_CONTRAST = 20.0  # grey levels between part and surroundings
 MIN_POINTS = 8
 THICKNESS_SAMPLES = 15
 PIXEL_FLOOR_PX = 0.03  # end-to-end error left by sampling and JPEG, seen on synthetic edges
+SHARP_WIDTH_PX = 3.0  # of an edge in focus; the error grows with the blur
 WIDTH_10_90 = 2.563  # sigmas of a blurred step between 10 % and 90 %
 
 
@@ -185,13 +186,15 @@ def _refine(
     reach = (undistort(pixels[[0, -1]]) - fit.centre) @ fit.direction
     ideal = fit.centre + reach[:, None] * fit.direction
     length = float(np.ptp(stations[good]))
+    width = _width(profile[good], depths, crossing[good])
+    floor = PIXEL_FLOOR_PX * max(1.0, width / SHARP_WIDTH_PX)
     return Edge(
         start=pixels[0] - fit.offsets_px[0] * _normal(fit.direction),
         end=pixels[-1] - fit.offsets_px[-1] * _normal(fit.direction),
         ideal=ideal,
-        u_rad=float(np.hypot(fit.u_direction_rad, PIXEL_FLOOR_PX / length)),
+        u_rad=float(np.hypot(fit.u_direction_rad, floor / length)),
         rms_px=fit.rms_px,
-        width_px=_width(profile[good], depths, crossing[good]),
+        width_px=width,
         contrast=float(np.median(contrast[good])),
         length_px=length,
         points=int(good.sum()),

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 HUBER_TUNING = 1.345  # 95 % efficiency on Gaussian residuals (Huber 1981)
+BISQUARE_TUNING = 4.685  # the same for Tukey's bisquare
 MAD_TO_SIGMA = 1.4826
-ITERATIONS = 4
+HUBER_STEPS, BISQUARE_STEPS = 3, 3
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,10 @@ class LineFit:
 
 
 def fit_line(points: FloatArray, weights: FloatArray) -> LineFit:
-    """Total least squares line through ordered points (n, 2), Huber-weighted.
+    """Robust total least squares line through ordered points (n, 2).
+
+    Huber weights come close to the line from anywhere, Tukey's bisquare then drops what is not
+    on it, as where something lies across a part of the edge.
 
     `weights` (n,) are relative prior weights. Neighbouring edge points are correlated by the
     lens, the sensor and JPEG blocks, so the number of independent points is smaller than n; it
@@ -37,10 +41,13 @@ def fit_line(points: FloatArray, weights: FloatArray) -> LineFit:
     robust = weights.astype(np.float64).copy()
     centre, direction, offsets = plain_line(points, robust)
     scale = 0.0
-    for _ in range(ITERATIONS):
+    for step in range(HUBER_STEPS + BISQUARE_STEPS):
         scale = max(MAD_TO_SIGMA * _median(np.abs(offsets)), 1e-4)
-        ratio = np.abs(offsets) / (HUBER_TUNING * scale)
-        robust = weights / np.maximum(ratio, 1.0)
+        if step < HUBER_STEPS:
+            robust = weights / np.maximum(np.abs(offsets) / (HUBER_TUNING * scale), 1.0)
+        else:
+            ratio = np.minimum(np.abs(offsets) / (BISQUARE_TUNING * scale), 1.0)
+            robust = weights * (1.0 - ratio**2) ** 2
         centre, direction, offsets = plain_line(points, robust)
     along = (points - centre) @ direction
     inlier = np.abs(offsets) < 3.0 * scale

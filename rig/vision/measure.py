@@ -45,10 +45,14 @@ class Limits:
     """Length of the cap's edge below which no direction is worth giving."""
     min_cap_share: float = 0.25
     """Length of the cap's edge relative to the connector's; less means a hidden cap."""
-    max_edge_width: float = 9.0
-    """10 % to 90 % width of the sharpest edge; more is a blurred frame."""
+    clipped_share: float = 0.5
+    """Share of a rigid part's pixels with blue at the white level from which it is overexposed."""
+    max_edge_width: float = 5.0
+    """10 % to 90 % width of the frame's sharpest edge; more is a blurred frame. Profiles reach
+    4 px into a part, so wider transitions have no plateau to be measured against."""
     max_blur_share: float = 0.6
-    """Same, relative to the thickness of the cap: the two edges of a thin cap run together."""
+    """Width of the cap's sharpest edge relative to the cap's thickness: the two edges of a thin
+    cap run together."""
     parallel_deg: float = 12.0
     """Edges within this of the best one are long edges of the same part."""
     max_disagreement_deg: float = 4.0
@@ -162,8 +166,7 @@ class AngleMeter:
 
         connector_edges = long_edges(image, connector, plane.undistort)
         cap_edges = long_edges(image, cap, plane.undistort)
-        self._check_sharpness(connector_edges, cap_edges, cap)
-        sharpest = min(edge.width_px for edge in [*connector_edges, *cap_edges])
+        sharpest = self._sharpest(connector_edges, cap_edges, cap)
         base = self._part_direction(connector_edges, sharpest, "connector")
         tip = self._part_direction(cap_edges, sharpest, "end cap")
         frame.connector, frame.cap = base, tip
@@ -221,6 +224,9 @@ class AngleMeter:
             raise UntrustedFrameError(
                 "the smaller blue part is above the larger one: the connector must be on top"
             )
+        for part, name in ((connector, "connector"), (cap, "end cap")):
+            if part.clipped_share > self.limits.clipped_share:
+                raise UntrustedFrameError(f"the {name} is overexposed: shorten the exposure")
         if cap.touches_border:
             raise UntrustedFrameError("the end cap is cut by the border of the frame")
         return connector, cap
@@ -237,18 +243,21 @@ class AngleMeter:
                 raise
             return PicturePlane(self.camera)
 
-    def _check_sharpness(self, base: list[Edge], tip: list[Edge], cap: BluePart) -> None:
+    def _sharpest(self, base: list[Edge], tip: list[Edge], cap: BluePart) -> float:
+        """Width in px of the frame's sharpest edge, which is the lens blur at most."""
         if not base:
             raise UntrustedFrameError("the connector has no straight edge: blurred or hidden")
         if not tip:
             raise UntrustedFrameError("the end cap has no straight edge: blurred or hidden")
-        width = min(edge.width_px for edge in tip)
+        width = min(edge.width_px for edge in [*base, *tip])
+        at_cap = min(edge.width_px for edge in tip)
         thickness = cap.area_px / max(edge.length_px for edge in tip)
-        if width > min(self.limits.max_edge_width, self.limits.max_blur_share * thickness):
+        if width > self.limits.max_edge_width or at_cap > self.limits.max_blur_share * thickness:
             raise UntrustedFrameError(
-                f"too blurred: the edges of the end cap are {width:.1f} px wide; focus the camera "
-                "or shorten its exposure"
+                f"too blurred: the edges of the end cap are {at_cap:.1f} px wide; focus the "
+                "camera or shorten its exposure"
             )
+        return width
 
     def _part_direction(self, edges: list[Edge], sharpest: float, name: str) -> _PartDirection:
         """Direction of a part from its long edges, weighted by their uncertainty."""
@@ -365,7 +374,7 @@ class _Frame:
         scores = np.array(
             [
                 min(edge.contrast for edge in edges) / 60.0,
-                1.0 - min(edge.width_px for edge in edges) / limits.max_edge_width,
+                1.0 - min(edge.width_px for edge in edges) / (2.0 * limits.max_edge_width),
                 1.0 - np.degrees(self.cap.spread_rad) / (2.0 * limits.parallel_deg),
                 1.0 - u_deg / limits.max_u_deg,
             ]

@@ -40,8 +40,8 @@ class RulerMarks:
 def find_ruler(levels: list[Image], marks: int) -> RulerMarks:
     """Marks of a ruler with `marks` on each leg; raises UntrustedFrameError without one.
 
-    `levels` is the pyramid of the BGR frame. The corner and its neighbours are needed, and all
-    but one mark of each leg.
+    `levels` is the pyramid of the BGR frame. The corner, its neighbours and the outermost
+    marks are needed; of the others each leg may miss one.
     """
     search = max(len(levels) - 2, 0)  # twice the size that is enough for the blue parts
     rough, diameters = _dark_holes(as_image(cv2.cvtColor(levels[search], cv2.COLOR_BGR2GRAY)))

@@ -24,6 +24,7 @@ MIN_SATURATION = 0.2  # blueness over B: a bluish white wall or skylight glare s
 COARSE_WIDTH = 320  # px: the search for parts needs no more
 MIN_AREA = 60.0  # full-size px: smaller specks are noise
 MAX_PARTS = 12
+CLIPPED_LEVEL = 252  # of 255; a blue part clips in blue first
 SEARCH_MARGIN = 2  # coarse pixels around a part that its full-size outline may reach
 
 
@@ -38,6 +39,7 @@ class BluePart:
     mask: Mask  # (h, w) 0 or 1 inside `window`
     window: tuple[int, int]  # left, top of the mask in the frame
     touches_border: bool
+    clipped_share: float  # share of its pixels with blue at the white level
 
     def contains(self, points: FloatArray) -> NDArray[np.bool_]:
         """Which of `points` (n, 2) px lie on the part."""
@@ -108,7 +110,8 @@ def _outline(
     top, left = region[0].start * factor, region[1].start * factor
     near = cv2.dilate(coarse, np.ones((3, 3), np.uint8), iterations=SEARCH_MARGIN)
     near = np.repeat(np.repeat(near, factor, axis=0), factor, axis=1)
-    blueness = _blueness(image[top : top + near.shape[0], left : left + near.shape[1]])
+    window = image[top : top + near.shape[0], left : left + near.shape[1]]
+    blueness = _blueness(window)
     mask = ((blueness > max(0.5 * level, MIN_BLUENESS)) & (near > 0)).astype(np.uint8)
     contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     if not contours:
@@ -134,4 +137,5 @@ def _outline(
         touches_border=bool(
             low[0] <= 1 or low[1] <= 1 or high[0] >= frame_width - 2 or high[1] >= frame_height - 2
         ),
+        clipped_share=float((window[..., 0][body > 0] >= CLIPPED_LEVEL).mean()),
     )

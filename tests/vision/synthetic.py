@@ -75,7 +75,8 @@ class Scene:
     offset: tuple[float, float] = (-40.0, -46.0)
     """Place of the connector's lower edge from the optical axis."""
 
-    def lit(self, **changes: object) -> Scene:
+    def but(self, **changes: object) -> Scene:
+        """The same scene with some things changed."""
         return replace(self, **changes)  # type: ignore[arg-type]
 
 
@@ -239,4 +240,4 @@ def random_scene(rng: np.random.Generator, angle: float, **changes: object) -> S
         tilt_x=float(tilt_x),
         tilt_y=float(tilt_y),
     )
-    return scene.lit(**changes)
+    return scene.but(**changes)
