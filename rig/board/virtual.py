@@ -19,7 +19,7 @@ from rig.link.bus import SlcanBus
 from rig.mechanics.profile import side_profile
 from rig.plant.camera import VirtualCamera
 from rig.plant.plant import Fixture, HiddenErrors, Plant, plant_parameters
-from rig.plant.specimen import draw_specimen
+from rig.plant.specimen import Specimen, draw_specimen
 from rig.spec.bench import BenchSpec
 from rig.spec.bench import VirtualBench as VirtualBenchSpec
 from rig.spec.workspace import Setup
@@ -50,15 +50,19 @@ def _virtual(bench: BenchSpec) -> VirtualBenchSpec:
     return bench.virtual
 
 
-def _plant(setup: Setup, seeds: _Seeds) -> Plant:
-    """The simulated bench with the specimen and the instrument errors that the seeds draw."""
-    bench, calibrations = setup.bench, setup.calibrations
-    specimen = draw_specimen(
+def _specimen(setup: Setup, seeds: _Seeds) -> Specimen:
+    """The printed actuator that the seeds draw."""
+    return draw_specimen(
         setup.actuator,
         setup.material,
-        _virtual(bench).specimen,
+        _virtual(setup.bench).specimen,
         np.random.default_rng(seeds.specimen),
     )
+
+
+def _plant(setup: Setup, specimen: Specimen, seeds: _Seeds) -> Plant:
+    """The simulated bench around a specimen, with the instrument errors that the seeds draw."""
+    bench, calibrations = setup.bench, setup.calibrations
     errors = HiddenErrors.draw(
         bench,
         calibrations.transducer,
@@ -78,7 +82,8 @@ def _plant(setup: Setup, seeds: _Seeds) -> Plant:
 
 def virtual_board(setup: Setup, seed: int) -> NativeBoard:
     """The native firmware on a simulated bench, without camera and truth file."""
-    plant = _plant(setup, _Seeds.of(seed, 0))
+    seeds = _Seeds.of(seed, 0)
+    plant = _plant(setup, _specimen(setup, seeds), seeds)
     return NativeBoard(plant, firmware_git=firmware_revision())
 
 
@@ -113,7 +118,8 @@ class VirtualBench:
         start_s: float = 0.0,
     ) -> None:
         seeds = _Seeds.of(seed, segment)
-        self.plant = _plant(setup, seeds)
+        specimen = _specimen(setup, seeds)
+        self.plant = _plant(setup, specimen, seeds)
         self._truth = TruthFile(truth_path) if truth_path is not None else None
         self._board = NativeBoard(
             self.plant,
@@ -126,7 +132,7 @@ class VirtualBench:
             setup.calibrations.camera,
             _virtual(setup.bench).optics,
             setup.calibrations.ruler,
-            setup.actuator.geometry,
+            specimen.geometry,
             setup.bench.camera.jpeg_quality,
             np.random.default_rng(seeds.camera),
             side_profile,
