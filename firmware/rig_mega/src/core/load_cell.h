@@ -30,10 +30,10 @@ class LoadCell {
     if (!connected_) return kNoFinding;
     ++silent_ticks_;
     if (!silent(timeout)) return kNoFinding;
-    return {Fault::kHx711Timeout, static_cast<float>(silent_ticks_) * to_seconds(kTick)};
+    return {Fault::kHx711Timeout, to_seconds(duration_of(silent_ticks_))};
   }
 
-  bool silent(Duration timeout) const { return connected_ && silent_ticks_ > ticks_of(timeout); }
+  bool silent(Duration timeout) const { return connected_ && duration_of(silent_ticks_) > timeout; }
 
   void begin_tare() { tare_.begin(); }
   void abandon_tare() { tare_.abandon(); }

@@ -20,10 +20,14 @@ void PlungerMotion::configure(const Parameters &parameters) {
   const Volume per_step = parameters.volume_per_step();
   if (per_step < per_step_ || per_step > per_step_) homed_ = false;
   per_step_ = per_step;
+  steps_per_ml_ = 1.0f / to_ml(per_step);
   travel_ = parameters.syringe_volume();
   acceleration_ = parameters.max_flow_acceleration();
-  const Flow fastest = per_step * kMaxStepsPerTick / kTick;
+  const Flow fastest = per_tick(per_step * kMaxStepsPerTick);
   max_flow_ = parameters.max_flow() < fastest ? parameters.max_flow() : fastest;
+  const float time_to_stop = max_flow_.value / acceleration_.value;
+  stopping_ = max_flow_ * (seconds(0.5f * time_to_stop) + kTick);
+  update_position();
 }
 
 void PlungerMotion::set_velocity(Flow velocity) {
@@ -47,10 +51,11 @@ void PlungerMotion::set_position(Volume position) {
   steps_ = nearest(steps);
   fraction_ = 0;
   homed_ = true;
+  update_position();
 }
 
-Volume PlungerMotion::position() const {
-  return per_step_ * (static_cast<float>(steps_) + fraction_);
+void PlungerMotion::update_position() {
+  position_ = per_step_ * (static_cast<float>(steps_) + fraction_);
 }
 
 bool PlungerMotion::arrived() const {
@@ -62,10 +67,11 @@ bool PlungerMotion::arrived() const {
 // v T + (v - a T) T + ... = v^2/2a + v T/2 = d.
 Flow PlungerMotion::braking(Volume distance) const {
   if (distance <= Volume{}) return {};
+  if (distance >= stopping_) return max_flow_;
   const float a = acceleration_.value;
   const float half = 0.5f * a * to_seconds(kTick);
   const float v = sqrtf(half * half + 2.0f * a * to_ml(distance)) - half;
-  const Flow in_one_tick = distance / kTick;
+  const Flow in_one_tick = per_tick(distance);
   return ml_s(v) < in_one_tick ? ml_s(v) : in_one_tick;
 }
 
@@ -100,7 +106,7 @@ StepSchedule PlungerMotion::tick() {
   const Flow goal = within_travel(wanted());
   const Flow change = acceleration_ * kTick;
   velocity_ += clamp(goal - velocity_, -change, change);
-  const float travel = (velocity_ * kTick) / per_step_;
+  const float travel = to_ml(velocity_ * kTick) * steps_per_ml_;
   if (!(travel < 0) && !(travel > 0)) return kNoSteps;
   const bool inward = travel > 0;
   const float phase = inward ? fraction_ : -fraction_;
@@ -108,6 +114,7 @@ StepSchedule PlungerMotion::tick() {
   const int32_t whole = static_cast<int32_t>(end);  // towards zero
   fraction_ = end - static_cast<float>(whole);
   steps_ += whole;
+  update_position();
   if (whole == 0) return kNoSteps;
   return schedule_steps(inward, phase, inward ? travel : -travel);
 }

@@ -31,7 +31,7 @@ class PlungerMotion {
   // Advances one tick; returns the steps to give in the next.
   StepSchedule tick();
 
-  Volume position() const;
+  Volume position() const { return position_; }
   Flow velocity() const { return velocity_; }
   bool moving() const { return magnitude(velocity_) > Flow{}; }
   // At the target of move_to, or at rest after stop.
@@ -40,6 +40,7 @@ class PlungerMotion {
   int8_t blocked() const { return blocked_; }
 
  private:
+  void update_position();
   Flow braking(Volume distance) const;
   Flow wanted() const;
   Flow within_travel(Flow wanted);
@@ -57,9 +58,12 @@ class PlungerMotion {
 
   int32_t steps_ = 0;    // whole steps given since home
   float fraction_ = 0;   // part of a step owed, -1 to 1
+  Volume position_ = {};
 
   Volume per_step_ = ml(1e-3f);
+  float steps_per_ml_ = 1e3f;
   Volume travel_ = {};
+  Volume stopping_ = {};  // from full speed
   Flow max_flow_ = {};
   FlowAcceleration acceleration_ = {};
 };

@@ -13,11 +13,12 @@ Pressure outside(Pressure error, Pressure deadband) {
 }
 
 Flow flow_demand(const Parameters &parameters, const SetpointRamp &setpoint, Volume plunger) {
+  if (setpoint.resting()) return {};
   const Volume gas = parameters.system_volume() - plunger;
   if (gas < Volume{}) return {};
   const Pressure absolute = parameters.ambient_pressure() + setpoint.value();
-  const float compression_per_s = (setpoint.rate() * seconds(1.0f)) / absolute;
-  return gas * (parameters.feed_forward() * compression_per_s) / seconds(1.0f);
+  const float compression = (setpoint.rate() * kTick) / absolute;
+  return per_tick(gas * (parameters.feed_forward() * compression));
 }
 
 }  // namespace

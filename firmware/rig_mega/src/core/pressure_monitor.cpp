@@ -77,7 +77,7 @@ Finding PressureMonitor::frozen(const Transducer &transducer, const PressureScen
   ++frozen_ticks_;
   if (frozen_ticks_ >= stuck_ticks_ &&
       magnitude(scene.plunger - frozen_plunger_) > stuck_volume_) {
-    return {Fault::kSensorStuck, static_cast<float>(frozen_ticks_) * to_seconds(kTick)};
+    return {Fault::kSensorStuck, to_seconds(duration_of(frozen_ticks_))};
   }
   return kNoFinding;
 }

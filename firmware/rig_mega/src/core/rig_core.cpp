@@ -119,8 +119,9 @@ Finding RigCore::watch_host() {
     host_silent_ticks_ = 0;
     return kNoFinding;
   }
-  if (++host_silent_ticks_ <= ticks_of(parameters_.communication_timeout())) return kNoFinding;
-  return {Fault::kCommunicationLost, static_cast<float>(host_silent_ticks_) * to_seconds(kTick)};
+  const Duration silent = duration_of(++host_silent_ticks_);
+  if (silent <= parameters_.communication_timeout()) return kNoFinding;
+  return {Fault::kCommunicationLost, to_seconds(silent)};
 }
 
 // Whatever the fault: the loop ends and the valve opens at once; the plunger stops and, if it can
@@ -378,8 +379,8 @@ void RigCore::send_load_cell(LoadCellStatus status) {
 }
 
 void RigCore::send_fault() {
-  const Duration age = kTick * static_cast<float>(safety_.fault_ticks());
-  link_.send(pack(FaultReport{safety_.fault(), safety_.fault_value(), age}));
+  link_.send(pack(FaultReport{safety_.fault(), safety_.fault_value(),
+                              duration_of(safety_.fault_ticks())}));
 }
 
 }  // namespace rig

@@ -135,9 +135,10 @@ class RigCore {
   uint16_t boot_ticks_ = 0;
   uint16_t fault_report_ticks_ = 0;
   uint16_t timeout_report_ticks_ = 0;
-  uint8_t heartbeat_ticks_ = 0;
+  // staggered: packing all of them in one tick would make the Mega late
   uint8_t pressure_ticks_ = 0;
-  uint8_t controller_ticks_ = 0;
+  uint8_t heartbeat_ticks_ = 3;
+  uint8_t controller_ticks_ = 6;
 };
 
 }  // namespace rig

@@ -16,7 +16,7 @@ class SetpointRamp {
 
   void tick(PressureRate limit) {
     const Pressure step = clamp(target_ - value_, -(limit * kTick), limit * kTick);
-    rate_ = step / kTick;
+    rate_ = per_tick(step);
     value_ += step;
     if (resting()) value_ = target_;
   }

@@ -16,6 +16,7 @@ void Transducer::configure(const Parameters &parameters) {
   gain_kpa_v_ = parameters.transducer_gain_kpa_v();
   offset_ = parameters.transducer_offset();
   volts_per_count_ = to_volts(parameters.adc_reference()) / kAdcCounts;
+  pressure_ = pressure_of(filtered_);
 }
 
 void Transducer::sample(uint32_t sum, uint8_t count) {
@@ -33,19 +34,22 @@ void Transducer::sample(uint32_t sum, uint8_t count) {
   Voltage sum_v = {};
   for (const Voltage &v : recent_) sum_v += v;
   filtered_ = sum_v * (1.0f / kFilterTicks);
+  pressure_ = pressure_of(filtered_);
   history_[next_history_] = filtered_;
   next_history_ = static_cast<uint8_t>((next_history_ + 1) % kRateTicks);
 }
 
 PressureRate Transducer::rate() const {
-  constexpr Duration kSpan = kTick * static_cast<float>(kRateTicks - 1);
-  return kpa(gain_kpa_v_ * to_volts(filtered_ - history_[next_history_])) / kSpan;
+  constexpr float kShare = 1.0f / (kRateTicks - 1);
+  const Voltage change = filtered_ - history_[next_history_];
+  return per_tick(kpa(gain_kpa_v_ * kShare * to_volts(change)));
 }
 
 bool Transducer::zero(Voltage at_ambient, Pressure limit) {
   const Voltage shift = at_ambient - offset_;
   if (magnitude(kpa(gain_kpa_v_ * to_volts(shift))) > limit) return false;
   shift_ = shift;
+  pressure_ = pressure_of(filtered_);
   return true;
 }
 

@@ -21,16 +21,17 @@ class Transducer {
   Voltage tick_voltage() const { return tick_; }   // mean of this tick
   Voltage voltage() const { return filtered_; }    // mean of the filter
   Pressure tick_pressure() const { return pressure_of(tick_); }
-  Pressure pressure() const { return pressure_of(filtered_); }
+  Pressure pressure() const { return pressure_; }
   PressureRate rate() const;
 
   // Moves the zero so that `at_ambient` reads 0 kPa; false if that is more than `limit` away.
   bool zero(Voltage at_ambient, Pressure limit);
+
+ private:
   Pressure pressure_of(Voltage voltage) const {
     return kpa(gain_kpa_v_ * to_volts(voltage - offset_ - shift_));
   }
 
- private:
   static constexpr uint8_t kFilterTicks = 4;
   static constexpr uint8_t kRateTicks = 8;
 
@@ -40,6 +41,7 @@ class Transducer {
   Voltage shift_ = {};
   Voltage tick_ = {};
   Voltage filtered_ = {};
+  Pressure pressure_ = {};
   Voltage recent_[kFilterTicks] = {};
   Voltage history_[kRateTicks] = {};  // filtered values, oldest at next_history_
   uint8_t next_recent_ = 0;

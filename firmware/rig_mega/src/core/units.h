@@ -50,9 +50,7 @@ constexpr float to_seconds(Duration t) { return t.value; }
 
 constexpr Volume operator*(Flow q, Duration t) { return ml(q.value * t.value); }
 constexpr Flow operator*(FlowAcceleration a, Duration t) { return ml_s(a.value * t.value); }
-constexpr Flow operator/(Volume v, Duration t) { return ml_s(v.value / t.value); }
 constexpr Pressure operator*(PressureRate r, Duration t) { return kpa(r.value * t.value); }
-constexpr PressureRate operator/(Pressure p, Duration t) { return kpa_s(p.value / t.value); }
 
 template <typename Q>
 constexpr Q clamp(Q x, Q low, Q high) {

@@ -20,6 +20,19 @@ StepSchedule running = kNoSteps;  // `count` is what is left
 volatile uint8_t ticks_waiting;
 TickSample sample_waiting;
 
+int16_t signed_steps(const StepSchedule &schedule) {
+  const int16_t count = static_cast<int16_t>(schedule.count);
+  return schedule.inward ? count : static_cast<int16_t>(-count);
+}
+
+StepSchedule merged(const StepSchedule &a, const StepSchedule &b) {
+  const int16_t sum = static_cast<int16_t>(signed_steps(a) + signed_steps(b));
+  if (sum == 0) return kNoSteps;
+  const uint16_t count = static_cast<uint16_t>(sum > 0 ? sum : -sum);
+  const uint16_t interval = kTimerTicksPerTick / count;
+  return {sum > 0, count, static_cast<uint16_t>(interval / 2), interval};
+}
+
 void step_at(uint16_t when) {
   const uint16_t soonest = static_cast<uint16_t>(TCNT1 + kSoonest);
   if (static_cast<int16_t>(when - soonest) < 0) when = soonest;
@@ -49,15 +62,16 @@ bool tick_due(TickSample &sample) {
 }
 
 void plan_steps(const StepSchedule &schedule) {
-  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) { planned = schedule; }
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+    planned = planned.count == 0 ? schedule : merged(planned, schedule);
+  }
 }
 
 ISR(TIMER1_COMPB_vect) {
   const uint16_t start = OCR1B;
   OCR1B = static_cast<uint16_t>(start + kTimerTicksPerTick);
-  const uint16_t owed = running.count;  // none, unless interrupts were late
-  running = planned;
-  running.count = static_cast<uint16_t>(running.count + owed);
+  // steps are only left over if interrupts were late
+  running = running.count == 0 ? planned : merged(running, planned);
   planned = kNoSteps;
   if (running.count != 0) {
     if (running.inward) {

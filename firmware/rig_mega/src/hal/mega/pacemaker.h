@@ -19,7 +19,8 @@ void pacemaker_begin();
 // True once for each tick, with the conversions made during it.
 bool tick_due(TickSample &sample);
 
-// The steps of the next tick.
+// The steps of the next tick. If the main loop was late and a plan is still waiting, both are given
+// together: steps are never lost, for they are the plunger's position.
 void plan_steps(const StepSchedule &schedule);
 
 }  // namespace mega
