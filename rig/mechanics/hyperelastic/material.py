@@ -1,0 +1,103 @@
+"""A whole material: an energy of distortion and, where that is isochoric, one of volume."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.mechanics.errors import MechanicsError
+from rig.mechanics.hyperelastic.polynomial import NeoHookean
+from rig.mechanics.hyperelastic.protocol import Array, Energy, Volumetric
+from rig.mechanics.hyperelastic.tensors import (
+    add_cofactor_slope,
+    cofactor,
+    determinant,
+    in_blocks,
+)
+from rig.mechanics.hyperelastic.volumetric import QuadraticVolume
+
+
+@dataclass(frozen=True)
+class Hyperelastic:
+    """W(F) = distortion(F) + volume(det F); implements `Energy` itself.
+
+    `distortion` is any `Energy`; `volume` is None where `distortion` already knows what a change
+    of volume costs (Saint Venant-Kirchhoff, linear). Mixed elements take the two parts, elements
+    in displacements only the sum.
+    """
+
+    distortion: Energy
+    volume: Volumetric | None
+
+    def energy(self, deformation_gradient: Array, /) -> Array:
+        """W in Pa, shape (...), for F of shape (3, 3, ...)."""
+        result = self.distortion.energy(deformation_gradient)
+        if self.volume is not None:
+            flat = deformation_gradient.reshape(3, 3, -1)
+            j = determinant(flat, cofactor(flat)).reshape(result.shape)
+            result = result + self.volume.energy(j)
+        return result
+
+    def first_piola(self, deformation_gradient: Array, /) -> Array:
+        """P + U'(J) cof F in Pa, shape (3, 3, ...)."""
+        result = self.distortion.first_piola(deformation_gradient)
+        volume = self.volume
+        if volume is None:
+            return result
+
+        def compute(f: Array, out: Array) -> None:
+            cof = cofactor(f)
+            np.multiply(volume.pressure(determinant(f, cof)), cof, out=out)
+
+        result += in_blocks(deformation_gradient, 2, compute)
+        return result
+
+    def tangent(self, deformation_gradient: Array, /) -> Array:
+        """A + U''(J) cof F (x) cof F + U'(J) d2J/dF2 in Pa, shape (3, 3, 3, 3, ...)."""
+        result = self.distortion.tangent(deformation_gradient)
+        volume = self.volume
+        if volume is None:
+            return result
+
+        def compute(f: Array, out: Array) -> None:
+            cof = cofactor(f)
+            j = determinant(f, cof)
+            np.multiply((volume.stiffness(j) * cof)[:, :, None, None], cof, out=out)
+            add_cofactor_slope(out, volume.pressure(j), f)
+
+        result += in_blocks(deformation_gradient, 4, compute)
+        return result
+
+
+def neo_hookean_from(young_modulus: float, poisson_ratio: float) -> Hyperelastic:
+    """The neo-Hookean material that is linear elasticity with E in Pa and nu at small strain.
+
+    Shear modulus E / (2 (1 + nu)), bulk modulus E / (3 (1 - 2 nu)), U = K/2 (J - 1)^2. Raises
+    MechanicsError unless E > 0 and -1 < nu < 0.5: an incompressible material has no bulk modulus.
+    """
+    return Hyperelastic(
+        NeoHookean(shear_modulus_from(young_modulus, poisson_ratio)),
+        QuadraticVolume(bulk_modulus_from(young_modulus, poisson_ratio)),
+    )
+
+
+def shear_modulus_from(young_modulus: float, poisson_ratio: float) -> float:
+    """E / (2 (1 + nu)) in Pa; raises MechanicsError unless E > 0 and -1 < nu < 0.5."""
+    _check_elastic(young_modulus, poisson_ratio)
+    return young_modulus / (2 * (1 + poisson_ratio))
+
+
+def bulk_modulus_from(young_modulus: float, poisson_ratio: float) -> float:
+    """E / (3 (1 - 2 nu)) in Pa; raises MechanicsError unless E > 0 and -1 < nu < 0.5."""
+    _check_elastic(young_modulus, poisson_ratio)
+    return young_modulus / (3 * (1 - 2 * poisson_ratio))
+
+
+def _check_elastic(young_modulus: float, poisson_ratio: float) -> None:
+    if not (young_modulus > 0 and -1 < poisson_ratio < 0.5):
+        raise MechanicsError(
+            f"no elastic solid has a Young's modulus of {young_modulus:g} Pa with a Poisson's "
+            f"ratio of {poisson_ratio:g}: expected a modulus above 0 and a ratio above -1 and "
+            "below 0.5; rubber is near 0.49, and 0.5 itself has no finite bulk modulus"
+        )
