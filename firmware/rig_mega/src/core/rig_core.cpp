@@ -8,7 +8,7 @@ namespace rig {
 
 namespace {
 
-constexpr uint16_t kBootTicks = ticks_of_ms(100);  // the filters fill
+constexpr uint16_t kBootTicks = ticks_of_ms(50);  // the filters fill; over before the first heartbeat
 constexpr uint16_t kSecondTicks = ticks_of_ms(1000);
 constexpr uint8_t kHeartbeatTicks = ticks_of_ms(100);
 constexpr uint8_t kPressureTicks = ticks_of_ms(20);
