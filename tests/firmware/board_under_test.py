@@ -56,7 +56,8 @@ def line_of(frame_id: int, payload: bytes) -> bytes:
 class Board:
     """A board that has been switched on, on a bench whose physics is in C.
 
-    `bench` gives access to the bench's state and its scriptable faults.
+    `bench` gives access to the bench's state and its scriptable faults, `conditions` sets it before
+    the gas is filled in.
     """
 
     def __init__(
@@ -67,10 +68,13 @@ class Board:
         reset_cause: int = POWER_ON,
         nonvolatile: bytes | None = None,
         opening: bytes = OPENING,
+        conditions: dict[str, float] | None = None,
     ) -> None:
         self.host = ffi.gc(lib.rig_host_new(0xABC123, reset_cause), lib.rig_host_free)
         self._bench = ffi.gc(lib.rig_test_bench_new(seed), lib.rig_test_bench_free)
         self.bench = lib.rig_test_bench_access(self._bench)
+        for name, value in (conditions or {}).items():
+            setattr(self.bench, name, value)
         lib.rig_test_bench_place(self._bench, plunger_ml)
         if nonvolatile is not None:
             lib.rig_host_nonvolatile_load(self.host, nonvolatile)

@@ -148,10 +148,7 @@ def test_each_step_of_1_kpa_settles_without_overshoot_and_without_steady_error(s
     ids=lambda c: "-".join(c),
 )
 def test_the_loop_holds_on_benches_it_was_not_tuned_for(conditions: dict[str, float]) -> None:
-    board = Board()
-    for name, value in conditions.items():
-        setattr(board.bench, name, value)
-    board.ready()
+    board = Board(conditions=conditions).ready()
     for target in (1.0, 5.0, 4.0, 10.0):
         board.command("set_pressure", target)
         start = board.bench.pressure_kpa
