@@ -27,13 +27,15 @@ def init(
 
     Example: `rig init my-lab`; after an update of rig: `rig init --schemas my-lab/models/schemas`
     """
-    from rig.spec.scaffold import make_workspace, refresh_schemas
+    from rig.report.summary import write_run_summary_schema
+    from rig.spec.scaffold import SCHEMAS, make_workspace, refresh_schemas
 
     if schemas:
-        for path in refresh_schemas(folder):
+        for path in (*refresh_schemas(folder), write_run_summary_schema(folder)):
             typer.echo(path)
         return
     make_workspace(folder)
+    write_run_summary_schema(folder / SCHEMAS)
     typer.echo(f"Workspace {folder} is ready. Next:")
     typer.echo(f"  cd {folder}")
     typer.echo("  rig characterise --actuator bellow-bending --protocol quick")

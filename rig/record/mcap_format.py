@@ -32,6 +32,7 @@ from mcap.records import (
     MetadataIndex,
     Schema,
 )
+from numpy.typing import NDArray
 
 from rig.record.errors import RecordError
 
@@ -180,6 +181,29 @@ def iter_messages(records: bytes) -> Iterator[tuple[int, int, int, int, int]]:
             _, _, channel_id, _, log_time, _ = unpack(records, position)
             yield channel_id, log_time, position, position + MESSAGE_HEAD.size, following
         position = following
+
+
+def read_channel(
+    log: memoryview, entry: ChunkEntry, channel_id: int
+) -> tuple[NDArray[np.int64], list[bytes]]:
+    """Log times in ns and payloads of one channel's messages in a chunk, by its message index.
+
+    Raises one of MALFORMED.
+    """
+    records = chunk_data(log, entry.index)
+    if entry.missing_indexes:
+        found = [m for m in iter_messages(records) if m[0] == channel_id]
+        return np.array([m[1] for m in found], np.int64), [records[m[3] : m[4]] for m in found]
+    place = entry.index.message_index_offsets[channel_id] + RECORD_HEAD.size + 6
+    index = np.frombuffer(log, "<i8", 2 * entry.counts[channel_id], place).reshape(-1, 2)
+    offsets = index[:, 1]
+    content = np.frombuffer(records, np.uint8)
+    if offsets.size and (offsets.min() < 0 or offsets.max() + MESSAGE_HEAD.size > content.size):
+        raise ValueError("a message index points outside its chunk")
+    lengths = content[offsets[:, None] + np.arange(1, RECORD_HEAD.size)].view("<i8")[:, 0]
+    starts = (offsets + MESSAGE_HEAD.size).tolist()
+    ends = (offsets + RECORD_HEAD.size + lengths).tolist()
+    return index[:, 0], [records[a:b] for a, b in zip(starts, ends, strict=True)]
 
 
 def scan(log: memoryview) -> Scan:

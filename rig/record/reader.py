@@ -41,7 +41,7 @@ from rig.record.documents import (
     StopDocument,
 )
 from rig.record.errors import RecordError
-from rig.record.mcap_format import MALFORMED, chunk_data, iter_messages, scan_log
+from rig.record.mcap_format import MALFORMED, chunk_data, iter_messages, read_channel, scan_log
 from rig.record.telemetry import columns
 
 AnyDocument = TypeVar("AnyDocument", bound=Document)
@@ -94,6 +94,7 @@ class RunReader:
                 f"the folder that `rig characterise` made, or its {LOG_FILE}."
             ) from error
         self._found = scan_log(self.path, self._log)
+        self._telemetry: dict[str, dict[str, NDArray[Any]]] = {}
         self._topics = {c.topic: c for c in self._found.channels.values()}
         starts = self._metadata(START_METADATA, StartDocument)
         if not starts:
@@ -186,23 +187,31 @@ class RunReader:
         Numbers are float64 (NaN where a row had none), enumerations text. A message that was
         never received gives only an empty `time_s`.
         """
+        known = self._telemetry.get(message)
+        if known is None:
+            known = self._telemetry[message] = self._read_telemetry(message)
+            for column in known.values():
+                column.flags.writeable = False  # the next caller gets the same arrays
+        return dict(known)
+
+    def _read_telemetry(self, message: str) -> dict[str, NDArray[Any]]:
         topic = telemetry_topic(message)
         channel = self._topics.get(topic)
         if channel is None:
             return {"time_s": np.empty(0)}
-        times_ns, payloads = self._bulk(topic)
+        time_s, payloads = self._bulk(topic)
         try:
             schema = json.loads(self._found.schemas[channel.schema_id].data)
             table = columns(payloads, schema["properties"])
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise self._foreign(topic, error) from error
-        return {"time_s": np.array(times_ns, dtype=np.float64) / 1e9} | table
+        return {"time_s": time_s} | table
 
     def can_frames(self) -> CanFrames:
         """Every raw frame of the link, for replay."""
-        times_ns, encoded = self._bulk(CAN_TOPIC)
+        time_s, encoded = self._bulk(CAN_TOPIC)
         return CanFrames(
-            time_s=np.array(times_ns, dtype=np.float64) / 1e9,
+            time_s=time_s,
             ids=np.array([int.from_bytes(e[1:5], "little") for e in encoded], dtype=np.uint32),
             payloads=[e[7:] for e in encoded],
         )
@@ -215,13 +224,21 @@ class RunReader:
                 totals[self._found.channels[channel_id].topic] += count
         return totals
 
-    def _bulk(self, topic: str) -> tuple[list[int], list[bytes]]:
-        times: list[int] = []
+    def _bulk(self, topic: str) -> tuple[NDArray[np.float64], list[bytes]]:
+        """Bench times and payloads of all messages of one channel."""
+        times: list[NDArray[np.int64]] = [np.empty(0, np.int64)]
         payloads: list[bytes] = []
-        for _, time_ns, data in self._messages(topic):
-            times.append(time_ns)
-            payloads.append(data)
-        return times, payloads
+        channel = self._topics.get(topic)
+        for entry in self._found.chunks:
+            if channel is None or channel.id not in entry.counts:
+                continue
+            try:
+                chunk_times, chunk_payloads = read_channel(self._log, entry, channel.id)
+            except MALFORMED as error:
+                raise self._foreign(topic, error) from error
+            times.append(chunk_times)
+            payloads += chunk_payloads
+        return np.concatenate(times) / 1e9, payloads
 
     def _messages(self, *topics: str) -> Iterator[tuple[str, int, bytes]]:
         """Topic, log time and payload of the messages of `topics`, in the order of the file."""

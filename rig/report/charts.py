@@ -94,7 +94,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Residuals:
-    """Model minus experiment with expanded validation uncertainty; arrays (n,)."""
+    """Differences, as model minus experiment, with expanded uncertainty; arrays (n,)."""
 
     label: str
     pressure_kpa: Array
@@ -170,8 +170,37 @@ def response_chart(
 
 
 @_styled
-def residual_chart(name: str, axis_label: str, residuals: Sequence[Residuals], alt: str) -> Chart:
-    """Model minus experiment against pressure with bars of the expanded validation uncertainty."""
+def comparison_chart(name: str, axis_label: str, branches: Sequence[Branch], alt: str) -> Chart:
+    """The same quantity of several runs against pressure, with bars of 95 %."""
+    figure, axes = _figure(SMALL)
+    for number, branch in enumerate(branches):
+        axes.errorbar(
+            branch.pressure_kpa,
+            branch.mean,
+            branch.u95,
+            fmt="osD^v"[number % 5],
+            ls=("-", *MODEL_LINES)[number % 5],
+            lw=1.2,
+            color=COLOURS[f"series-{number % 5 + 1}"],
+            ms=5,
+            capsize=2.5,
+            elinewidth=1,
+            label=branch.label,
+        )
+    axes.set_xlabel("pressure (kPa)")
+    axes.set_ylabel(axis_label)
+    _legend_below(figure)
+    return _chart(figure, name, alt)
+
+
+@_styled
+def residual_chart(
+    name: str, axis_label: str, residuals: Sequence[Residuals], alt: str, *, legend: bool = False
+) -> Chart:
+    """Differences against pressure with bars of their expanded uncertainty.
+
+    Labels stand at the curves' ends, or with `legend` below, where long ones have room.
+    """
     figure, axes = _figure(SMALL)
     axes.axhline(0, color=COLOURS["ink"], lw=1)
     labels = []
@@ -182,20 +211,24 @@ def residual_chart(name: str, axis_label: str, residuals: Sequence[Residuals], a
             one.pressure_kpa + shift,
             one.error,
             one.expanded,
-            fmt="sD^P"[number % 4],
+            fmt="sD^v"[number % 4],
             ls=MODEL_LINES[number % 4],
             lw=1.2,
             color=colour,
             ms=5,
             capsize=2.5,
             elinewidth=1.2,
+            label=one.label,
         )
         labels.append(
             _end_label(one.label, one.pressure_kpa, one.error, len(one.error) - 1, colour)
         )
     axes.set_xlabel("pressure (kPa)")
     axes.set_ylabel(axis_label)
-    _place_labels(axes, labels)
+    if legend:
+        _legend_below(figure)
+    else:
+        _place_labels(axes, labels)
     return _chart(figure, name, alt)
 
 
@@ -287,9 +320,11 @@ def step_chart(
     if settling_time_s is not None:
         axes.axvline(settling_time_s, color=COLOURS["ink"], lw=1, ls=":")
         axes.annotate(
-            f" settled after {settling_time_s:.2f} s",
+            f"settled after {settling_time_s:.2f} s",
             (settling_time_s, 0.45),
             xycoords=("data", "axes fraction"),
+            xytext=(5, 0),
+            textcoords="offset points",
         )
     axes.legend(loc="lower right", frameon=False)
     axes.set_xlabel("time since the set-point (s)")
@@ -337,8 +372,13 @@ def _place_labels(axes: Axes, labels: Sequence[_EndLabel]) -> None:
     axes.set_ylim(low, high)
 
 
+def _legend_below(figure: Figure) -> None:
+    figure.legend(loc="outside lower left", ncols=1, frameon=False)
+
+
 def _model_colour(number: int) -> str:
-    return COLOURS[f"series-{number % 3 + 2}"]
+    """Series 1 is the experiment; models, and runs held against the first, follow."""
+    return COLOURS[f"series-{number % 4 + 2}"]
 
 
 def _figure(size: tuple[float, float]) -> tuple[Figure, Axes]:

@@ -144,6 +144,7 @@ def render_report(data: RunData, summary: RunSummary, predictions: Mapping[str, 
             for name, experiment in summary.experiments.items()
             for verdict in _verdicts(name, experiment)
         ],
+        citations=_citations(summary),
         sections=sections,
         measured=sum(e.measured for e in summary.experiments.values()),
         planned=sum(e.planned for e in summary.experiments.values()),
@@ -159,24 +160,25 @@ def render_report(data: RunData, summary: RunSummary, predictions: Mapping[str, 
 
 def headline(summary: RunSummary) -> tuple[str, ...]:
     """The run in a sentence or two, with its numbers."""
-    found = []
-    verbs: dict[ExperimentName, str] = {
-        "deformation": "bends by",
-        "blocked_force": "pushes, held straight, with",
-    }
+    at_top: dict[float, list[str]] = {}
     for name, experiment in summary.experiments.items():
         up = [level for level in experiment.points if level.direction == "up"]
         if up:
             top = max(up, key=lambda level: level.pressure_kpa)
             value = uncertain(top.mean, top.u95, experiment.unit)
-            found.append(f"{verbs[name]} {value} at {top.pressure_kpa:g} kPa")
-    sentences = []
-    if found:
-        sentences.append(f"{summary.actuator} {' and '.join(found)}.")
+            does = (
+                f"bends by {value}"
+                if name == "deformation"
+                else f"presses with {value} when blocked"
+            )
+            at_top.setdefault(top.pressure_kpa, []).append(does)
+    sentences = [
+        f"At {kpa:g} kPa {summary.actuator} {' and '.join(does)}." for kpa, does in at_top.items()
+    ]
     errors: dict[str, list[str]] = {}
     for experiment in summary.experiments.values():
         for model, result in experiment.models.items():
-            share = f", {result.nrmse.value:.2g} % of its range" if result.nrmse else ""
+            share = f", {significant(result.nrmse.value, 2)} % of its range" if result.nrmse else ""
             rms = uncertain(result.rmse.value, result.rmse.u95, result.rmse.unit)
             errors.setdefault(model, []).append(f"the {experiment.quantity} by {rms} RMS{share}")
     for model, misses in errors.items():
@@ -211,7 +213,7 @@ def _verdict(
     return Verdict(
         title=f"{TITLES[name]}, {model_name(model)}",
         result=uncertain(result.rmse.value, result.rmse.u95, unit),
-        percent=f"{result.nrmse.value:.2g} % of the range" if result.nrmse else "",
+        percent=f"{significant(result.nrmse.value, 2)} % of the range" if result.nrmse else "",
         lines=(
             f"mean {uncertain(abs(bias.value), bias.u95, unit)} {side} the experiment",
             f"at most {uncertain(largest.value, largest.u95, unit)}, at "
@@ -239,6 +241,16 @@ def _note(experiment: ExperimentSummary, model: str) -> str:
         if len(figures) > 1:
             return "the paper contradicts itself"
     return ""
+
+
+def _citations(summary: RunSummary) -> list[tuple[str, str]]:
+    """Each paper once, with what to know about its figures."""
+    found = [
+        (reference.citation, reference.note)
+        for experiment in summary.experiments.values()
+        for reference in experiment.references
+    ]
+    return list(dict.fromkeys(found))
 
 
 def _step_rows(controller: ControllerSummary | None) -> tuple[StepRow, ...]:

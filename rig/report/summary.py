@@ -7,6 +7,7 @@ uncertainty for a level of confidence of 95 %. Floats keep six significant digit
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict
@@ -238,3 +239,10 @@ def run_summary_schema() -> str:
     schema = RunSummary.model_json_schema(mode="serialization")
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
     return json.dumps(schema, indent=2, sort_keys=True) + "\n"
+
+
+def write_run_summary_schema(folder: Path) -> Path:
+    """Write the schema into `folder`, which must exist; returns its path."""
+    path = folder / "run-summary.json"
+    path.write_text(run_summary_schema(), encoding="utf-8")
+    return path

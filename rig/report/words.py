@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 MODEL_NAMES = {"beam": "beam theory", "fe": "finite elements"}
-UNIT_NAMES = {"deg": "°", "g": " g", "%": " %"}
+NO_BREAK = "\N{NO-BREAK SPACE}"
 MINUS = "\N{MINUS SIGN}"
 PLUS_MINUS = "\N{PLUS-MINUS SIGN}"
 
@@ -35,8 +35,8 @@ def decimals_for(u: float) -> int:
 def uncertain(value: float, u95: float, unit: str = "") -> str:
     """`9.12 ± 0.28 deg`: two digits of uncertainty, the value to the same decimals."""
     decimals = decimals_for(u95)
-    text = f"{number(value, decimals)} {PLUS_MINUS} {number(u95, decimals)}"
-    return f"{text} {unit}".rstrip()
+    parts = [number(value, decimals), PLUS_MINUS, number(u95, decimals), unit]
+    return NO_BREAK.join(part for part in parts if part)
 
 
 def significant(value: float, digits: int = 3) -> str:

@@ -137,6 +137,19 @@ def validation_statement(errors: ComparisonErrors) -> ValidationStatement:
     )
 
 
+def en_number(first: Estimate, second: Estimate) -> float:
+    """Difference second - first over its expanded uncertainty (ISO 13528:2022, 9.7).
+
+    Beyond 1 the two results do not agree within their uncertainties for 95 %, taken as
+    independent. Infinite with the sign of the difference if both are free of uncertainty.
+    """
+    difference = second.value - first.value
+    expanded = math.hypot(first.u95, second.u95)
+    if expanded == 0:
+        return math.copysign(math.inf, difference) if difference else 0.0
+    return difference / expanded
+
+
 @dataclass(frozen=True)
 class Repeatability:
     """Scatter of repeats under the same conditions."""

@@ -15,6 +15,7 @@ from rig.validate.errors import ValidateError
 from rig.validate.metrics import (
     ComparisonErrors,
     bias,
+    en_number,
     hysteresis,
     maximum_error,
     normalised,
@@ -132,6 +133,14 @@ def test_rmse_is_never_more_uncertain_than_its_worst_level(
 ) -> None:
     errors = errors_of(error, u, common)
     assert rmse(errors).u <= errors.u_validation.max() * (1 + 1e-9)
+
+
+def test_results_agree_when_they_differ_by_less_than_their_joint_uncertainty() -> None:
+    first, second = Estimate(10.0, 0.3), Estimate(11.0, 0.4)
+    assert en_number(first, second) == pytest.approx(1.0 / (1.959964 * 0.5), rel=1e-6)
+    assert en_number(second, first) == -en_number(first, second)
+    assert en_number(Estimate(1.0, 0.0), Estimate(1.0, 0.0)) == 0.0
+    assert en_number(Estimate(1.0, 0.0), Estimate(0.5, 0.0)) == -math.inf
 
 
 def test_repeatability_pools_levels_by_their_degrees_of_freedom() -> None:
