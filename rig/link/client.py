@@ -188,7 +188,7 @@ class RigLink:
         if message.name == "HEARTBEAT":
             self.status = BoardStatus(
                 time_s=message.time_s,
-                state=self._states.get(int(values["state"]), "unknown"),
+                state=self._state(message),
                 fault=self._faults.get(int(values["fault_code"]), "unknown"),
                 homed=bool(values["homed"]),
                 zeroed=bool(values["zeroed"]),
@@ -203,6 +203,9 @@ class RigLink:
             code = self._faults.get(int(values["code"]), "unknown")
             found_s = message.time_s - float(values["age_s"])
             self._fault_detail = (code, float(values["fault_value"]), found_s)
+
+    def _state(self, heartbeat: Message) -> str:
+        return self._states.get(int(heartbeat.values["state"]), "unknown")
 
     def _check_silence(self) -> None:
         silent_s = self.now_s - self._last_intact_s
@@ -275,11 +278,12 @@ class RigLink:
         end_s = self.now_s + timeout_s
         while self.now_s < end_s:
             for message in self.receive(ACKNOWLEDGE_POLL_S):
-                if message.name == "HEARTBEAT":
+                if message.name == "HEARTBEAT" and self._state(message) != "boot":
                     self._number = int(message.values["command_number"])
                     return
         raise LinkLostError(
-            f"the board at {self._bus.name} answered but sends no heartbeat; reset the board."
+            f"the board at {self._bus.name} answered but sends no heartbeat, or does not "
+            "leave its boot state; reset the board."
         )
 
     def set_tap(self, tap: Tap | None) -> None:
