@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from rig.spec.base import SpecModel, require
+from rig.spec.hyperelastic import HyperelasticSpec
 from rig.spec.quantity import Density, Modulus, Ratio, Strength
 
 
@@ -68,3 +69,7 @@ class MaterialSpec(SpecModel):
     density: SourcedDensity
     tensile_strength: StrengthRange | None = None
     elongation_at_break: RatioRange | None = None
+    hyperelastic: HyperelasticSpec | None = Field(
+        None,
+        description="energy at large strain; without it, neo-Hookean from the two constants",
+    )

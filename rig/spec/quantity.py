@@ -138,6 +138,7 @@ _DIMENSIONS = {
     "m**2": "area",
     "m**3": "volume",
     "Pa": "pressure",
+    "Pa**-1": "compressibility",
     "kg/m**3": "density",
     "s": "time",
     "Hz": "frequency",
@@ -254,6 +255,7 @@ Volume = Annotated[float, Unit("m**3", "mL", "volume")]
 Pressure = Annotated[float, Unit("Pa", "kPa", "pressure")]
 Modulus = Annotated[float, Unit("Pa", "kPa", "modulus", "450")]
 Strength = Annotated[float, Unit("Pa", "MPa", "strength", "2.4")]
+Compressibility = Annotated[float, Unit("Pa**-1", "MPa**-1", "compressibility", "0.2")]
 Density = Annotated[float, Unit("kg/m**3", "kg/m**3", "density", "1160")]
 Duration = Annotated[float, Unit("s", "s", "time")]
 Frequency = Annotated[float, Unit("Hz", "Hz", "frequency")]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.mechanics.errors import MechanicsError
+from rig.mechanics.hyperelastic.moduli import bulk_modulus_from, shear_modulus_from
 from rig.mechanics.hyperelastic.polynomial import NeoHookean
 from rig.mechanics.hyperelastic.protocol import Array, Energy, Volumetric
 from rig.mechanics.hyperelastic.tensors import (
@@ -14,6 +14,7 @@ from rig.mechanics.hyperelastic.tensors import (
     cofactor,
     determinant,
     in_blocks,
+    sum_of_dyads,
 )
 from rig.mechanics.hyperelastic.volumetric import QuadraticVolume
 
@@ -41,33 +42,31 @@ class Hyperelastic:
 
     def first_piola(self, deformation_gradient: Array, /) -> Array:
         """P + U'(J) cof F in Pa, shape (3, 3, ...)."""
-        result = self.distortion.first_piola(deformation_gradient)
-        volume = self.volume
+        distortion, volume = self.distortion, self.volume
         if volume is None:
-            return result
+            return distortion.first_piola(deformation_gradient)
 
         def compute(f: Array, out: Array) -> None:
             cof = cofactor(f)
             np.multiply(volume.pressure(determinant(f, cof)), cof, out=out)
+            out += distortion.first_piola(f)
 
-        result += in_blocks(deformation_gradient, 2, compute)
-        return result
+        return in_blocks(deformation_gradient, 2, compute)
 
     def tangent(self, deformation_gradient: Array, /) -> Array:
         """A + U''(J) cof F (x) cof F + U'(J) d2J/dF2 in Pa, shape (3, 3, 3, 3, ...)."""
-        result = self.distortion.tangent(deformation_gradient)
-        volume = self.volume
+        distortion, volume = self.distortion, self.volume
         if volume is None:
-            return result
+            return distortion.tangent(deformation_gradient)
 
         def compute(f: Array, out: Array) -> None:
             cof = cofactor(f)
             j = determinant(f, cof)
-            np.multiply((volume.stiffness(j) * cof)[:, :, None, None], cof, out=out)
+            sum_of_dyads((volume.stiffness(j) * cof)[None], cof[None], out)
             add_cofactor_slope(out, volume.pressure(j), f)
+            out += distortion.tangent(f)
 
-        result += in_blocks(deformation_gradient, 4, compute)
-        return result
+        return in_blocks(deformation_gradient, 4, compute)
 
 
 def neo_hookean_from(young_modulus: float, poisson_ratio: float) -> Hyperelastic:
@@ -80,24 +79,3 @@ def neo_hookean_from(young_modulus: float, poisson_ratio: float) -> Hyperelastic
         NeoHookean(shear_modulus_from(young_modulus, poisson_ratio)),
         QuadraticVolume(bulk_modulus_from(young_modulus, poisson_ratio)),
     )
-
-
-def shear_modulus_from(young_modulus: float, poisson_ratio: float) -> float:
-    """E / (2 (1 + nu)) in Pa; raises MechanicsError unless E > 0 and -1 < nu < 0.5."""
-    _check_elastic(young_modulus, poisson_ratio)
-    return young_modulus / (2 * (1 + poisson_ratio))
-
-
-def bulk_modulus_from(young_modulus: float, poisson_ratio: float) -> float:
-    """E / (3 (1 - 2 nu)) in Pa; raises MechanicsError unless E > 0 and -1 < nu < 0.5."""
-    _check_elastic(young_modulus, poisson_ratio)
-    return young_modulus / (3 * (1 - 2 * poisson_ratio))
-
-
-def _check_elastic(young_modulus: float, poisson_ratio: float) -> None:
-    if not (young_modulus > 0 and -1 < poisson_ratio < 0.5):
-        raise MechanicsError(
-            f"no elastic solid has a Young's modulus of {young_modulus:g} Pa with a Poisson's "
-            f"ratio of {poisson_ratio:g}: expected a modulus above 0 and a ratio above -1 and "
-            "below 0.5; rubber is near 0.49, and 0.5 itself has no finite bulk modulus"
-        )

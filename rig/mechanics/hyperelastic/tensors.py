@@ -47,7 +47,8 @@ def cofactor(f: Array) -> Array:
 
 def determinant(f: Array, cof: Array) -> Array:
     """det F, (n), from F and its cofactor."""
-    return f[0, 0] * cof[0, 0] + f[0, 1] * cof[0, 1] + f[0, 2] * cof[0, 2]
+    result: Array = f[0, 0] * cof[0, 0] + f[0, 1] * cof[0, 1] + f[0, 2] * cof[0, 2]
+    return result
 
 
 def square(f: Array) -> Array:
