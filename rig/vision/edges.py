@@ -25,8 +25,8 @@ MAX_RUNS = 3  # both long sides of a rectangle, and what may contradict them
 LONG_SHARE = 0.4  # of the first run: shorter ones are ends and fragments, not long edges
 MAX_GAP_PX = 6.0
 MAX_OUTLINE_POINTS = 160
-CHORD_STARTS = 40
-CONTESTANTS = 12
+CHORD_STARTS = 32
+CONTESTANTS = 8
 CHORD_SPANS = (0.1, 0.2, 0.35)  # of the outline; a thin rectangle's long side is almost half
 END_TRIM = 0.06  # of the run at each end: corners are rounded by blur
 MIN_TRIM_PX = 2.0
@@ -35,9 +35,9 @@ REACH_IN_PX = 4.0  # inner half: the part's colour next to the edge, not of its 
 STEP_PX = 0.5
 PLATEAU_PX = 1.5  # length of the profile ends that define the two colours
 COLOUR_WINDOW = 9  # edge points over which those colours are averaged
-MIN_CONTRAST = 20.0  # grey levels between part and surroundings
+MIN_CONTRAST = 8.0  # linear light between part and surroundings, of 255
 MIN_POINTS = 8
-THICKNESS_SAMPLES = 15
+MASK_SAMPLES = 15  # points of an edge at which the part's mask is looked at
 PIXEL_FLOOR_PX = 0.03  # end-to-end error left by sampling and JPEG, seen on synthetic edges
 SHARP_WIDTH_PX = 3.0  # of an edge in focus; the error grows with the blur
 WIDTH_10_90 = 2.563  # sigmas of a blurred step between 10 % and 90 %
@@ -53,7 +53,7 @@ class Edge:
     u_rad: float  # standard uncertainty of the direction: scatter and pixel floor
     rms_px: float
     width_px: float  # 10 % to 90 % width of the transition
-    contrast: float  # grey levels
+    contrast: float  # linear light between part and surroundings, of 255
     length_px: float
     points: int
 
@@ -172,9 +172,10 @@ def _refine(
         return None
     base = centre + stations[:, None] * direction
     outward = _normal(direction)
-    if part.contains(base + 2.0 * outward).sum() > part.contains(base - 2.0 * outward).sum():
+    some = base[:: max(1, len(base) // MASK_SAMPLES)]
+    if part.contains(some + 2.0 * outward).sum() > part.contains(some - 2.0 * outward).sum():
         outward = -outward
-    reach_in = _inner_reach(part, base, outward)
+    reach_in = _inner_reach(part, some, outward)
     depths = np.arange(-reach_in, REACH_OUT_PX + 0.5 * STEP_PX, STEP_PX)
     profile, contrast = _profiles(image, base, outward, depths)
     crossing, found = _half_way(profile, depths)
@@ -208,9 +209,8 @@ def _normal(direction: FloatArray) -> FloatArray:
 def _inner_reach(part: BluePart, base: FloatArray, outward: FloatArray) -> float:
     """How far profiles may go into the part: half of its local thickness, 2 to 4 px."""
     depths = np.arange(1.0, 2.0 * REACH_IN_PX + 1.0)
-    some = base[:: max(1, len(base) // THICKNESS_SAMPLES)]
-    grid = (some[:, None, :] - depths[None, :, None] * outward).reshape(-1, 2)
-    inside = part.contains(grid).reshape(len(some), len(depths))
+    grid = (base[:, None, :] - depths[None, :, None] * outward).reshape(-1, 2)
+    inside = part.contains(grid).reshape(len(base), len(depths))
     thickness = float(np.median(np.minimum.accumulate(inside, axis=1).sum(axis=1)))
     return float(np.clip(round(thickness) / 2.0, 2.0, REACH_IN_PX))
 
@@ -220,7 +220,7 @@ def _profiles(
 ) -> tuple[FloatArray, FloatArray]:
     """Share of the part's colour along normals (n, depths): one inside, zero outside.
 
-    Also the contrast (n,) in grey levels between the two ends.
+    Also the contrast (n,) between the two ends, in linear light.
     """
     grid = (base[:, None, :] + depths[None, :, None] * outward).astype(np.float32)
     colour = cv2.remap(

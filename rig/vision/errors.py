@@ -16,3 +16,7 @@ class VisionError(RigError):
 
 class UntrustedFrameError(Exception):
     """Why a frame gives no angle; never leaves the package, it becomes a rejected measurement."""
+
+
+class UnsharpFrameError(UntrustedFrameError):
+    """The edges are not good enough at this resolution; a coarser one may still do."""

@@ -12,7 +12,7 @@ FloatArray = NDArray[np.float64]
 HUBER_TUNING = 1.345  # 95 % efficiency on Gaussian residuals (Huber 1981)
 BISQUARE_TUNING = 4.685  # the same for Tukey's bisquare
 MAD_TO_SIGMA = 1.4826
-HUBER_STEPS, BISQUARE_STEPS = 3, 3
+HUBER_STEPS, BISQUARE_STEPS = 2, 3
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ flat layer. A frame that cannot be trusted is rejected with a reason, never gues
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import cv2
@@ -15,7 +15,7 @@ import numpy as np
 
 from rig.spec.calibration import CameraCalibration, RulerCalibration
 from rig.vision.edges import LONG_SHARE, Edge, long_edges
-from rig.vision.errors import UntrustedFrameError, VisionError
+from rig.vision.errors import UnsharpFrameError, UntrustedFrameError, VisionError
 from rig.vision.lines import FloatArray
 from rig.vision.plane import PicturePlane, rectify
 from rig.vision.ruler import find_ruler
@@ -23,9 +23,14 @@ from rig.vision.segment import BluePart, Image, find_blue_parts, pyramid
 
 Side = Literal["left", "right"]
 
+FULL_CONTRAST = 40.0
+"""Contrast of an edge, in linear light of 255, from which more does not make it better."""
 BLEEDING_FACTOR = 1.4
 """An edge this much wider than the best one of its part is no blurred step: the part's colour
 bleeds into the translucent body there. The edges of the rigid front face do not bleed."""
+CROOKED_FACTOR, STRAIGHT_PX = 3.0, 0.5
+"""An edge whose points scatter more than both this multiple of the best one's and this many pixels
+is not straight: something is mounted on it or before it."""
 BLEEDING_DRIFT = 0.4
 """Drift from end to end of an edge within its extra width, as a share of it: the standard
 deviation of the difference of two uniform deviates."""
@@ -39,6 +44,10 @@ class Limits:
     """Grey level that the brightest hundredth of the frame must exceed."""
     saturated_share: float = 0.5
     """Share of white pixels (250 and more) from which the exposure is wrong."""
+    same_blue_share: float = 0.4
+    """Blueness relative to the bluest part from which a part may be of the same material."""
+    mounting_gap: float = 0.5
+    """Gap to the connector, relative to its thickness, below which a part belongs to it."""
     speck_share: float = 0.15
     """Blue parts smaller than this share of the cap are specks."""
     min_cap_px: float = 16.0
@@ -128,17 +137,44 @@ class AngleMeter:
         camera calibration; whatever is wrong with the picture itself is a rejection.
         """
         self._check(image_bgr)
+        return self._measure(pyramid(image_bgr))
+
+    def _measure(self, levels: list[Image]) -> AngleMeasurement:
+        """The measurement in the finest level of a pyramid in which edges are sharp.
+
+        Large frames are often unsharp in single pixels, by focus, motion or enlargement, but
+        sharp at half their size; the same limits hold there. What is said is about the frame
+        as it came.
+        """
         frame = _Frame()
         try:
-            angle, u = self._angle(image_bgr, frame)
+            angle, u = self._angle(levels, frame)
+        except UnsharpFrameError as why:
+            if len(levels) > 1:
+                coarse = self._halved()._measure(levels[1:])
+                if coarse.accepted:
+                    return _doubled(coarse)
+            return frame.rejected(str(why))
         except UntrustedFrameError as why:
-            return AngleMeasurement(
-                None, 0.0, 0.0, False, str(why), frame.scale_mm_per_px, frame.geometry()
-            )
+            return frame.rejected(str(why))
         quality = frame.quality(self.limits, u)
         return AngleMeasurement(
             angle, u, quality, True, "", frame.scale_mm_per_px, frame.geometry()
         )
+
+    def _halved(self) -> AngleMeter:
+        """The same meter for frames of half the size."""
+        if self.camera is None:
+            return self
+        half = {
+            "width": self.camera.width // 2,
+            "height": self.camera.height // 2,
+            "focal_x": 0.5 * self.camera.focal_x,
+            "focal_y": 0.5 * self.camera.focal_y,
+            "centre_x": 0.5 * self.camera.centre_x - 0.25,
+            "centre_y": 0.5 * self.camera.centre_y - 0.25,
+        }
+        return replace(self, camera=self.camera.model_copy(update=half))
 
     def _check(self, image: Image) -> None:
         if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8 or not image.size:
@@ -154,18 +190,17 @@ class AngleMeter:
                 "mode, or none."
             )
 
-    def _angle(self, image: Image, frame: _Frame) -> tuple[float, float]:
+    def _angle(self, levels: list[Image], frame: _Frame) -> tuple[float, float]:
         """Angle and standard uncertainty in deg; notes in `frame` what it finds on the way."""
-        levels = pyramid(image)
         self._check_exposure(levels[-1])
         parts = find_blue_parts(levels)
         frame.parts = parts
-        connector, cap = self._choose(parts)
+        frame.chosen = connector, cap = self._choose(parts)
         plane = self._plane(levels, frame)
         frame.scale_mm_per_px = plane.scale_mm_per_px(0.5 * (connector.centroid + cap.centroid))
 
-        connector_edges = long_edges(image, connector, plane.undistort)
-        cap_edges = long_edges(image, cap, plane.undistort)
+        connector_edges = long_edges(levels[0], connector, plane.undistort)
+        cap_edges = long_edges(levels[0], cap, plane.undistort)
         sharpest = self._sharpest(connector_edges, cap_edges, cap)
         base = self._part_direction(connector_edges, sharpest, "connector")
         tip = self._part_direction(cap_edges, sharpest, "end cap")
@@ -186,7 +221,7 @@ class AngleMeter:
             )
         )
         if u > self.limits.max_u_deg:
-            raise UntrustedFrameError(f"the angle would be uncertain by {u:.1f} deg")
+            raise UnsharpFrameError(f"the angle would be uncertain by {u:.1f} deg")
         return float(angle), u
 
     @property
@@ -206,10 +241,10 @@ class AngleMeter:
         """The fixed connector, the largest part, and the only other one, the end cap."""
         if not parts:
             raise UntrustedFrameError("no actuator: no blue rigid part in the frame")
-        connector, *others = parts
-        others = [
-            part for part in others if part.area_px > self.limits.speck_share * others[0].area_px
-        ]
+        faintest = self.limits.same_blue_share * max(part.blueness for part in parts)
+        connector, *others = [part for part in parts if part.blueness > faintest]
+        others = [part for part in others if not self._is_mounting(part, connector)]
+        others = [p for p in others if p.area_px > self.limits.speck_share * others[0].area_px]
         if not others:
             raise UntrustedFrameError(
                 "only one blue part: connector or end cap is missing or hidden"
@@ -231,6 +266,13 @@ class AngleMeter:
             raise UntrustedFrameError("the end cap is cut by the border of the frame")
         return connector, cap
 
+    def _is_mounting(self, part: BluePart, connector: BluePart) -> bool:
+        """Whether a part is so close to the connector that it is what holds it."""
+        near, far = connector.box, part.box
+        gap = max(near[0] - far[2], far[0] - near[2], near[1] - far[3], far[1] - near[3])
+        thickness = min(near[2] - near[0], near[3] - near[1])
+        return gap < self.limits.mounting_gap * thickness
+
     def _plane(self, levels: list[Image], frame: _Frame) -> PicturePlane:
         if self.ruler is None:
             return PicturePlane(self.camera)
@@ -246,14 +288,14 @@ class AngleMeter:
     def _sharpest(self, base: list[Edge], tip: list[Edge], cap: BluePart) -> float:
         """Width in px of the frame's sharpest edge, which is the lens blur at most."""
         if not base:
-            raise UntrustedFrameError("the connector has no straight edge: blurred or hidden")
+            raise UnsharpFrameError("the connector has no straight edge: blurred or hidden")
         if not tip:
-            raise UntrustedFrameError("the end cap has no straight edge: blurred or hidden")
+            raise UnsharpFrameError("the end cap has no straight edge: blurred or hidden")
         width = min(edge.width_px for edge in [*base, *tip])
         at_cap = min(edge.width_px for edge in tip)
         thickness = cap.area_px / max(edge.length_px for edge in tip)
         if width > self.limits.max_edge_width or at_cap > self.limits.max_blur_share * thickness:
-            raise UntrustedFrameError(
+            raise UnsharpFrameError(
                 f"too blurred: the edges of the end cap are {at_cap:.1f} px wide; focus the "
                 "camera or shorten its exposure"
             )
@@ -275,14 +317,16 @@ class AngleMeter:
         widths = np.array([edge.width_px for edge in edges])
         sharp = widths <= max(BLEEDING_FACTOR * widths[best], widths[best] + 1.0)
         long = lengths >= LONG_SHARE * lengths[best]  # the best need not be the longest
-        chosen = np.flatnonzero((np.abs(apart) <= limit) & sharp & long)
+        scatter = np.array([edge.rms_px for edge in edges])
+        straight = scatter <= max(CROOKED_FACTOR * scatter[best], STRAIGHT_PX)
+        chosen = np.flatnonzero((np.abs(apart) <= limit) & sharp & long & straight)
         weight = 1.0 / u[chosen] ** 2
         mean = float(weight @ apart[chosen] / weight.sum())
         u_mean = float(1.0 / np.sqrt(weight.sum()))
         gaps = np.abs(apart[chosen] - apart[best])
         allowed = 3.0 * np.hypot(u[chosen], u[best])
         if (gaps > np.maximum(allowed, np.radians(self.limits.max_disagreement_deg))).any():
-            raise UntrustedFrameError(
+            raise UnsharpFrameError(
                 f"the long edges of the {name} disagree by {np.degrees(gaps.max()):.1f} deg"
             )
         if len(chosen) > 1:  # Birge: edges that scatter more than they claim widen the result
@@ -353,17 +397,24 @@ class _Frame:
     """What has been found so far; becomes part of the measurement wherever the search ends."""
 
     parts: list[BluePart] = field(default_factory=list)
+    chosen: tuple[BluePart, ...] = ()  # connector and cap
     connector: _PartDirection | None = None
     cap: _PartDirection | None = None
     ruler_marks: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
     scale_mm_per_px: float | None = None
 
+    def rejected(self, reason: str) -> AngleMeasurement:
+        return AngleMeasurement(
+            None, 0.0, 0.0, False, reason, self.scale_mm_per_px, self.geometry()
+        )
+
     def geometry(self) -> FrameGeometry:
         outlines = tuple(part.outline for part in self.parts)
         connector = cap = None
         if self.connector and self.cap:
-            connector = PartGeometry(outlines[0], _segments(self.connector))
-            cap = PartGeometry(outlines[1], _segments(self.cap))
+            base, tip = (part.outline for part in self.chosen)
+            connector = PartGeometry(base, _segments(self.connector))
+            cap = PartGeometry(tip, _segments(self.cap))
         return FrameGeometry(connector, cap, outlines, self.ruler_marks)
 
     def quality(self, limits: Limits, u_deg: float) -> float:
@@ -373,13 +424,36 @@ class _Frame:
         edges = [*self.connector.edges, *self.cap.edges]
         scores = np.array(
             [
-                min(edge.contrast for edge in edges) / 60.0,
+                min(edge.contrast for edge in edges) / FULL_CONTRAST,
                 1.0 - min(edge.width_px for edge in edges) / (2.0 * limits.max_edge_width),
                 1.0 - np.degrees(self.cap.spread_rad) / (2.0 * limits.parallel_deg),
                 1.0 - u_deg / limits.max_u_deg,
             ]
         )
         return float(np.prod(np.clip(scores, 0.01, 1.0)) ** 0.25)
+
+
+def _doubled(half: AngleMeasurement) -> AngleMeasurement:
+    """A measurement of a halved frame in the pixels of the whole one."""
+
+    def part(found: PartGeometry | None) -> PartGeometry | None:
+        if found is None:
+            return None
+        return PartGeometry(_up(found.outline), tuple(_up(edge) for edge in found.edges))
+
+    geometry = FrameGeometry(
+        part(half.geometry.connector),
+        part(half.geometry.cap),
+        tuple(_up(outline) for outline in half.geometry.candidates),
+        _up(half.geometry.ruler_marks),
+    )
+    scale = None if half.scale_mm_per_px is None else 0.5 * half.scale_mm_per_px
+    return replace(half, geometry=geometry, scale_mm_per_px=scale)
+
+
+def _up(points: FloatArray) -> FloatArray:
+    """Pixels of a frame of pixels of its half; a pixel's centre is its whole number."""
+    return 2.0 * points + 0.5
 
 
 def _segments(part: _PartDirection) -> tuple[FloatArray, ...]:

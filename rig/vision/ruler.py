@@ -7,8 +7,10 @@ mirrored.
 
 from __future__ import annotations
 
+from cmath import phase
 from dataclasses import dataclass
 from itertools import combinations
+from math import degrees
 
 import cv2
 import numpy as np
@@ -26,7 +28,6 @@ STEP_TOLERANCE = 0.2  # of the step: perspective and lens change neighbouring st
 MIN_CORNER_DEG, MAX_CORNER_DEG = 60.0, 120.0
 MAX_CANDIDATES = 80
 PAPER_PX = (2.0, 4.0)  # ring of white paper beyond a mark's radius
-GREY_WEIGHTS = np.array([0.114, 0.587, 0.299])  # of B, G, R (ITU-R BT.601)
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,8 @@ def find_ruler(levels: list[Image], marks: int) -> RulerMarks:
     indices = [corner, *first.values(), *second.values()]
     grid = [(0, 0), *((k, 0) for k in first), *((0, k) for k in second)]
     radius = 0.5 * float(np.median(diameters[indices]))
-    pixels = _centres(levels[0], rough[indices], radius)
+    grey = as_image(cv2.cvtColor(levels[0], cv2.COLOR_BGR2GRAY))
+    pixels = _centres(grey, rough[indices], radius)
     return RulerMarks(pixels=pixels, grid=np.array(grid, dtype=np.float64))
 
 
@@ -107,20 +109,21 @@ def _legs(points: FloatArray, marks: int) -> tuple[int, Leg, Leg] | None:
     arms = points[None, :, :] - points[:, None, :]
     distance = np.hypot(arms[..., 0], arms[..., 1])
     np.fill_diagonal(distance, np.inf)
+    places = [complex(*point) for point in points.tolist()]
     near = np.argsort(distance, axis=1, kind="stable")[:, :4]
     best: tuple[int, Leg, Leg] | None = None
     for corner, neighbours in enumerate(near.tolist()):
         for one, two in combinations(neighbours, 2):
-            a, b = arms[corner, one].tolist(), arms[corner, two].tolist()
-            cross, dot = a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1]
-            if not MIN_CORNER_DEG < abs(np.degrees(np.arctan2(cross, dot))) < MAX_CORNER_DEG:
+            a, b = places[one] - places[corner], places[two] - places[corner]
+            opening = degrees(phase(b * a.conjugate()))
+            if not MIN_CORNER_DEG < abs(opening) < MAX_CORNER_DEG:
                 continue
             first = _walk(points, corner, one, marks)
             second = _walk(points, corner, two, marks)
             if first is None or second is None:
                 continue
             if best is None or len(first) + len(second) > len(best[1]) + len(best[2]):
-                best = (corner, first, second) if cross > 0.0 else (corner, second, first)
+                best = (corner, first, second) if opening > 0.0 else (corner, second, first)
     return best
 
 
@@ -131,10 +134,9 @@ def _walk(points: FloatArray, corner: int, neighbour: int, marks: int) -> Leg | 
     place, here = 1, points[neighbour]
     while place <= marks:
         for stride in (1, 2):  # one mark may be hidden
-            guess = here + stride * step
-            miss = np.hypot(*(points - guess).T)
-            found = int(np.argmin(miss))
-            if miss[found] < STEP_TOLERANCE * np.hypot(*step):
+            miss = ((points - here - stride * step) ** 2).sum(axis=1)
+            found = int(miss.argmin())
+            if miss[found] < STEP_TOLERANCE**2 * float(step @ step):
                 step = (points[found] - here) / stride
                 place, here = place + stride, points[found]
                 leg[place] = found
@@ -144,7 +146,7 @@ def _walk(points: FloatArray, corner: int, neighbour: int, marks: int) -> Leg | 
     return leg if max(leg) == marks and len(leg) >= marks - 1 else None
 
 
-def _centres(image: Image, rough: FloatArray, radius: float) -> FloatArray:
+def _centres(grey: Image, rough: FloatArray, radius: float) -> FloatArray:
     """Centroids (n, 2) of the light that each mark takes away; even blur does not move them.
 
     The paper around gives the white level as a plane, so that a light gradient does not pull.
@@ -152,11 +154,9 @@ def _centres(image: Image, rough: FloatArray, radius: float) -> FloatArray:
     reach = int(np.ceil(radius + PAPER_PX[1]))
     steps = np.arange(-reach, reach + 1)
     middle = np.rint(rough).astype(int)
-    rows = np.clip(middle[:, 1, None] + steps, 0, image.shape[0] - 1)[:, :, None]
-    columns = np.clip(middle[:, 0, None] + steps, 0, image.shape[1] - 1)[:, None, :]
-    patches = image[rows, columns]  # (n, k, k, 3)
-    grey = patches.astype(np.float64) @ GREY_WEIGHTS
-    light = to_light(grey)
+    rows = np.clip(middle[:, 1, None] + steps, 0, grey.shape[0] - 1)[:, :, None]
+    columns = np.clip(middle[:, 0, None] + steps, 0, grey.shape[1] - 1)[:, None, :]
+    light = to_light(grey[rows, columns].astype(np.float64))  # (n, k, k)
     x, y = np.broadcast_arrays(columns - rough[:, 0, None, None], rows - rough[:, 1, None, None])
     away = np.hypot(x, y)
     paper = (away > radius + PAPER_PX[0]) & (away < radius + PAPER_PX[1])

@@ -18,7 +18,6 @@ from rig.vision.lines import FloatArray
 Image = NDArray[np.uint8]
 Mask = NDArray[np.uint8]
 
-BLUENESS = np.array([[1.0, -0.5, -0.5]], dtype=np.float32)  # of B, G, R
 MIN_BLUENESS = 22.0  # grey levels: well above chroma noise of dark pixels
 MIN_SATURATION = 0.2  # blueness over B: a bluish white wall or skylight glare stays out
 COARSE_WIDTH = 320  # px: the search for parts needs no more
@@ -39,6 +38,7 @@ class BluePart:
     mask: Mask  # (h, w) 0 or 1 inside `window`
     window: tuple[int, int]  # left, top of the mask in the frame
     touches_border: bool
+    blueness: float  # median, grey levels
     clipped_share: float  # share of its pixels with blue at the white level
 
     def contains(self, points: FloatArray) -> NDArray[np.bool_]:
@@ -71,7 +71,9 @@ def find_blue_parts(levels: list[Image]) -> list[BluePart]:
     """Blue parts of a BGR image, largest first; `levels` is its `pyramid`."""
     image, small, factor = levels[0], levels[-1], 2 ** (len(levels) - 1)
     coarse = _blueness(small)
-    mask = ((coarse > MIN_BLUENESS) & (coarse > MIN_SATURATION * small[..., 0])).astype(np.uint8)
+    floor = cv2.convertScaleAbs(small[..., 0], alpha=MIN_SATURATION)
+    mask = cv2.threshold(coarse, MIN_BLUENESS, 255, cv2.THRESH_BINARY)[1]
+    mask = cv2.bitwise_and(mask, cv2.compare(coarse, floor, cv2.CMP_GT))
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
     order = 1 + np.argsort(-stats[1:, cv2.CC_STAT_AREA], kind="stable")[:MAX_PARTS]
     parts: list[BluePart] = []
@@ -87,8 +89,10 @@ def find_blue_parts(levels: list[Image]) -> list[BluePart]:
     return sorted(parts, key=lambda part: -part.area_px)
 
 
-def _blueness(image: Image) -> NDArray[np.float32]:
-    return np.asarray(cv2.transform(image.astype(np.float32), BLUENESS), dtype=np.float32)
+def _blueness(image: Image) -> Image:
+    """B - (R + G) / 2 in whole grey levels; zero where it is negative."""
+    blue, green, red = cv2.split(image)
+    return as_image(cv2.subtract(blue, cv2.addWeighted(green, 0.5, red, 0.5, 0.0)))
 
 
 def _padded(box: list[int], shape: tuple[int, ...]) -> tuple[slice, slice]:
@@ -137,5 +141,6 @@ def _outline(
         touches_border=bool(
             low[0] <= 1 or low[1] <= 1 or high[0] >= frame_width - 2 or high[1] >= frame_height - 2
         ),
+        blueness=level,
         clipped_share=float((window[..., 0][body > 0] >= CLIPPED_LEVEL).mean()),
     )

@@ -136,6 +136,17 @@ def test_more_blur_lowers_the_quality(meter):
     assert qualities == sorted(qualities, reverse=True)
 
 
+def test_a_soft_frame_is_measured_at_half_its_size_in_its_own_pixels(meter):
+    """Everything that is said about a frame is in the pixels of the frame as it came."""
+    sharp, soft = (meter.measure(render(Scene(blur=blur))) for blur in (0.8, 3.5))
+    assert soft.accepted, soft.reason
+    assert abs(soft.angle_deg - 40.0) < 3.0 * soft.u_deg
+    assert soft.scale_mm_per_px == pytest.approx(sharp.scale_mm_per_px, rel=1e-3)
+    assert np.abs(soft.geometry.ruler_marks - sharp.geometry.ruler_marks).max() < 0.3
+    middles = [r.geometry.cap.outline.mean(axis=0) for r in (sharp, soft)]
+    assert np.abs(middles[0] - middles[1]).max() < 3.0
+
+
 def test_the_same_frame_always_gives_the_same_numbers(meter):
     image = render(Scene())
     first, again = meter.measure(image), meter.measure(image.copy())

@@ -63,3 +63,12 @@ def test_turning_the_real_picture_leaves_the_angle(footage, turn):
         straight, tilted = meter.measure(image), meter.measure(turned)
         assert tilted.accepted, (path.name, tilted.reason)
         assert tilted.angle_deg == pytest.approx(straight.angle_deg, abs=4.0), path.name
+
+
+@pytest.mark.parametrize("factor", [2, 3])
+def test_an_enlarged_picture_is_measured_at_the_size_at_which_it_is_sharp(footage, factor):
+    meter = AngleMeter()
+    for name, by_hand in (("motion_3938", 47.0), ("motion_3998", 95.0), ("motion_4018", 108.0)):
+        image = cv2.imread(str(footage / f"{name}.png"))
+        large = cv2.resize(image, None, fx=factor, fy=factor, interpolation=cv2.INTER_CUBIC)
+        assert abs(meter.measure(large).angle_deg - by_hand) < LABEL_TOLERANCE_DEG
