@@ -14,8 +14,8 @@ HINTS: dict[str, str] = {
     "leak": "The plunger had to push this much more air (mL) to hold the pressure: look for a leak "
     "at the actuator, the tube or the valve.",
     "travel_limit": "The plunger reached the end of its travel (mL), or a limit switch closed "
-    "where it should not: the system holds more air than the syringe can compress, or the plunger lost "
-    "steps; look for a leak, a stalled motor, or use a larger syringe.",
+    "where it should not: the system holds more air than the syringe can compress, or the "
+    "plunger lost steps; look for a leak, a stalled motor, or use a larger syringe.",
     "hx711_timeout": "No conversion from the load cell for this long (s): check the HX711's "
     "supply, clock and data lines.",
     "hx711_desync": "The load cell's words are implausible: check the HX711's clock line.",
