@@ -164,12 +164,12 @@ class BellowShape:
     @cached_property
     def cavity_volume(self) -> float:
         """Volume of the undeformed cavity in m3: full revolve united with the channel."""
-        return self._swept_volume(0.0, self.channel_section)
+        return self.swept_volume(0.0, self.channel_section)
 
     @cached_property
     def soft_volume(self) -> float:
         """Volume of soft material in m3: bellow, channel, bottom layer and both end walls."""
-        outside = self._swept_volume(self.wall, self.solid_section)
+        outside = self.swept_volume(self.wall, self.solid_section)
         walls = 2 * self.wall * self._end_section_area
         inlet = np.pi * INLET_RADIUS**2 * self.wall
         return outside + walls - inlet - self.cavity_volume
@@ -191,7 +191,7 @@ class BellowShape:
     def _end_section_area(self) -> float:
         return float(disc_union(np.array(self.end_wall_top), self.solid_section).area)
 
-    def _swept_volume(self, offset: float, section: Array) -> float:
+    def swept_volume(self, offset: float, section: Array) -> float:
         """Integral over x of the union of the revolved profile with a constant section.
 
         The flanks are normal to the axis and contribute nothing; the arcs are integrated by

@@ -1,0 +1,1 @@
+"""Meshes of the actuator families for the finite-element models."""

@@ -1,0 +1,193 @@
+"""Structured second-order blocks: lattices of nodes, and one conforming mesh made of many.
+
+A block of a x b x c hexahedra is an array (2a+1, 2b+1, 2c+1, 3): corners at even indices, nodes of
+the 27-node element between them. Blocks that share a face share its node positions; they are
+joined by position.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+from skfem import ElementHex2, MeshHex, MeshHex2
+
+from rig.mechanics.errors import MechanicsError
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Side = Literal["i-", "i+", "j-", "j+", "k-", "k+"]
+
+JOIN_TOLERANCE = 1e-9
+"""Nodes closer than this are one node, metres: a thousandth of a micrometre."""
+
+
+class MeshError(MechanicsError):
+    """A mesh cannot be made: an element would be inverted, or blocks do not fit together."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """A lattice of nodes, metres, with names for some of its sides."""
+
+    nodes: Array
+    """(2a+1, 2b+1, 2c+1, 3)."""
+    names: dict[Side, str] = field(default_factory=dict)
+
+    def shifted(self, x: float) -> Block:
+        """The block moved along the axis by `x` metres."""
+        return Block(self.nodes + np.array([x, 0.0, 0.0]), self.names)
+
+    def mirrored(self, x: float) -> Block:
+        """The block mirrored in the plane of constant `x`, metres."""
+        nodes = self.nodes * np.array([-1.0, 1.0, 1.0])
+        nodes[..., 0] += 2 * x
+        return Block(nodes, self.names)
+
+
+def between(start: Array, end: Array, elements: int) -> Array:
+    """Lattice points from one array of points straight to another, new axis before the last."""
+    share = np.linspace(0.0, 1.0, 2 * elements + 1)[:, np.newaxis]
+    return np.asarray(start[..., np.newaxis, :] * (1 - share) + end[..., np.newaxis, :] * share)
+
+
+def line(start: Array, end: Array, elements: int) -> Array:
+    """Lattice points on a straight line, (2 elements + 1, d)."""
+    return between(np.asarray(start, dtype=float), np.asarray(end, dtype=float), elements)
+
+
+def transfinite(low: Array, high: Array, left: Array, right: Array) -> Array:
+    """Patch between four curves that meet at their ends (Gordon and Hall), (m, n, d).
+
+    `low` and `high` run along the first index (m, d), `left` joins their first points and `right`
+    their last ones (n, d). Opposite curves have as many points.
+    """
+    u = np.linspace(0.0, 1.0, low.shape[0])[:, np.newaxis, np.newaxis]
+    v = np.linspace(0.0, 1.0, left.shape[0])[np.newaxis, :, np.newaxis]
+    return np.asarray(
+        (1 - v) * low[:, np.newaxis]
+        + v * high[:, np.newaxis]
+        + (1 - u) * left[np.newaxis]
+        + u * right[np.newaxis]
+        - (1 - u) * (1 - v) * low[0]
+        - u * (1 - v) * low[-1]
+        - (1 - u) * v * high[0]
+        - u * v * high[-1]
+    )
+
+
+def rounded_strip(
+    arc: Array, foot: Array, columns: int, *, centre: Array
+) -> tuple[list[Array], Array]:
+    """Quarter of a disc on top of a strip, meshed without flat corners; patches and their foot.
+
+    `arc` runs from the symmetry line (its highest point) round to the strip's side, (2n + 1, 2);
+    its first `columns` elements stand over the core of the strip, the others beside it. `centre`
+    is where the strip begins on the symmetry line, `foot` its cross line from there to the end of
+    the arc, (2m + 1, 2) with m > columns: m - columns elements lie between core and arc. Returns
+    three patches, first index across the strip or along the arc, second index downwards, and the
+    points of the symmetry line from the top of the arc to `centre`.
+    """
+    ring = (foot.shape[0] - 1) // 2 - columns
+    core = 2 * columns
+    top, corner = arc[: core + 1], arc[core]
+    share = min(1.2 * columns / (columns + ring), 0.85)
+    inner = centre + share * (corner - centre)
+    rows = (arc.shape[0] - 1) // 2 - columns
+    on_axis = centre + columns / (columns + ring) * (arc[0] - centre)
+    core_top = line(on_axis, inner, columns)
+    axis_ring, axis_core = line(arc[0], on_axis, ring), line(on_axis, centre, rows)
+    spoke = line(corner, inner, ring)
+    core_side = line(inner, foot[core], rows)
+    patches = [
+        transfinite(top, core_top, axis_ring, spoke),
+        transfinite(core_top, foot[: core + 1], axis_core, core_side),
+        transfinite(spoke[::-1], foot[core:], core_side, arc[core:]),
+    ]
+    return patches, np.concatenate([axis_ring, axis_core[1:]])
+
+
+# places of the 27 nodes in an element in the order of scikit-fem, vertices first, as lattice offsets
+_CORNERS = 8
+_OFFSETS = np.rint(2 * np.asarray(ElementHex2().doflocs)).astype(int)
+
+
+def join(blocks: Sequence[Block]) -> tuple[MeshHex2, dict[str, Indices]]:
+    """One conforming second-order mesh of all blocks, and the facets of every named side.
+
+    Raises MeshError if a block's elements are inside out both ways round.
+    """
+    blocks = [_right_handed(block) for block in blocks]
+    points = np.concatenate([block.nodes.reshape(-1, 3) for block in blocks])
+    _, unique = _merged(points)
+    starts = np.cumsum([0] + [block.nodes[..., 0].size for block in blocks])
+    elements, sides = [], []
+    for block, start in zip(blocks, starts, strict=False):
+        index = unique[start + np.arange(block.nodes[..., 0].size)].reshape(block.nodes.shape[:3])
+        elements.append(_elements(index))
+        sides += [(name, _side_corners(index, side)) for side, name in block.names.items()]
+    nodes27 = np.concatenate(elements)
+    position = np.empty((unique.max() + 1, 3))
+    position[unique] = points
+    used, corners = np.unique(nodes27[:, :_CORNERS], return_inverse=True)
+    vertex = np.full(position.shape[0], -1)
+    vertex[used] = np.arange(used.size)
+    linear = MeshHex(
+        np.ascontiguousarray(position[used].T),
+        np.ascontiguousarray(corners.reshape(-1, _CORNERS).T),
+        sort_t=False,
+    )
+    mesh = MeshHex2.from_mesh(linear)
+    mesh.doflocs[:, mesh.dofs.element_dofs.T] = position[nodes27].transpose(2, 0, 1)
+    facet_of = {tuple(key): number for number, key in enumerate(np.sort(mesh.facets.T, axis=1))}
+    named: dict[str, list[int]] = {}
+    for name, quads in sides:
+        keys = np.sort(vertex[quads], axis=1)
+        named.setdefault(name, []).extend(facet_of[tuple(key)] for key in keys)
+    return mesh, {name: np.unique(facets) for name, facets in named.items()}
+
+
+def _elements(index: Indices) -> Indices:
+    """Node numbers of every element of a lattice, (elements, 27) in scikit-fem's order."""
+    cells = [np.arange(0, size - 1, 2) for size in index.shape]
+    origin = np.stack(np.meshgrid(*cells, indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    at = origin + _OFFSETS
+    return np.asarray(index[at[..., 0], at[..., 1], at[..., 2]])
+
+
+def _side_corners(index: Indices, side: Side) -> Indices:
+    """Node numbers of the corners of every facet on one side of a lattice, (facets, 4)."""
+    face = np.moveaxis(index, "ijk".index(side[0]), 0)[0 if side[1] == "-" else -1][::2, ::2]
+    quads = [face[:-1, :-1], face[1:, :-1], face[1:, 1:], face[:-1, 1:]]
+    return np.stack([quad.ravel() for quad in quads], axis=-1)
+
+
+_FLIPPED: dict[Side, Side] = {"i-": "i+", "i+": "i-"}
+
+
+def _right_handed(block: Block) -> Block:
+    """The block, its first index reversed if its elements are left-handed as they are."""
+    corner = block.nodes[::2, ::2, ::2]
+    i = np.diff(corner, axis=0)[:, :-1, :-1]
+    j = np.diff(corner, axis=1)[:-1, :, :-1]
+    k = np.diff(corner, axis=2)[:-1, :-1, :]
+    volume = np.einsum("...i,...i", np.cross(i, j), k).sum()
+    if volume > 0:
+        return block
+    names = {_FLIPPED.get(side, side): name for side, name in block.names.items()}
+    return Block(block.nodes[::-1], names)
+
+
+def _merged(points: Array) -> tuple[int, Indices]:
+    """Number of distinct points, and for every point the number of its distinct one."""
+    pairs = cKDTree(points).query_pairs(JOIN_TOLERANCE, output_type="ndarray")
+    size = points.shape[0]
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(size, size))
+    count, label = connected_components(graph, directed=False)
+    return int(count), label
