@@ -196,7 +196,7 @@ def _verdicts(name: ExperimentName, experiment: ExperimentSummary) -> list[Verdi
             title=f"{TITLES[name]}, {model_name(model)}",
             result="",
             percent="",
-            lines=("not predicted in this run",),
+            lines=("not predicted in this run" if experiment.points else "nothing was measured",),
             agrees=False,
             references=_reference_lines(experiment, model),
             note=_note(experiment, model),

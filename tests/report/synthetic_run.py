@@ -54,6 +54,10 @@ class Story:
     experiments: tuple[ExperimentName, ...] = ("deformation", "blocked_force")
 
 
+SHORT = {"repeats": 3, "step_kpa": 2.5, "hold_s": 4.0, "frames": 2}
+"""Changes that make a story quick to write and to read."""
+
+
 def library_setup() -> Setup:
     """The set-up of the shipped library."""
     return Workspace(library_root(), is_library=True).setup("bellow-bending")
