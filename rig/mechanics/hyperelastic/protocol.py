@@ -17,7 +17,8 @@ class Energy(Protocol):
     """Stored energy W(F) per reference volume, in J/m3 = Pa; zero at rest, where F = I.
 
     Most energies here are isochoric: they see only J^(-1/3) F and leave the change of volume to a
-    `Volumetric`. Where det F <= 0 the energy is infinite and its derivatives are not a number.
+    `Volumetric`. Where det F <= 0 their energy is infinite and its derivatives are not finite,
+    without a warning or an error: a line search may step there.
     """
 
     def energy(self, deformation_gradient: Array, /) -> Array:
