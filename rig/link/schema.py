@@ -61,11 +61,15 @@ class Schema:
         return int(definition.frame_id), bytes(definition.encode(complete, strict=True))
 
     def decode(self, frame_id: int, payload: bytes) -> tuple[str, dict[str, float | int]] | None:
-        """Name and values of a frame, or None if the schema does not know it."""
+        """Name and values of a frame, or None if the schema does not know it.
+
+        CRC and alive counter protect the frame on its way and are not part of the values.
+        """
         definition = self._by_id.get(frame_id)
         if definition is None or len(payload) != definition.length:
             return None
         values: dict[str, float | int] = definition.decode(payload, decode_choices=False)
+        del values["crc"], values["alive"]
         for signal, decimals in self._decimals[definition.name]:
             # a scaled signal is a decimal number: 0.05, not 0.05000000000000071
             values[signal] = round(values[signal], decimals)
