@@ -24,9 +24,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from skfem import MeshHex2
 
 from rig.mechanics.bellow import BellowShape
+from rig.mechanics.mesh.curved import CurvedHex
 from rig.mechanics.mesh.lattice import (
     Block,
     between,
@@ -97,7 +97,7 @@ class BendingResolution:
 class BendingBellowMesh:
     """Half of the soft body, metres; x along the axis, y >= 0, z up to the crests."""
 
-    mesh: MeshHex2
+    mesh: CurvedHex
     """27-node hexahedra with the facet sets `clamped` (x = -t), `cap` (x = L + t), `symmetry`
     (y = 0), `cavity` and `outside` as boundaries; together they are the whole boundary."""
     bottom_far_edge: Indices
@@ -470,6 +470,7 @@ def rib_volume(geometry: BellowBendingGeometry) -> float:
     """
     shape = BellowShape.of(geometry)
     outline = _inner_outline(shape)
-    right = np.stack([outline.end, outline.kink, outline.start])
+    knee = [outline.kink] if outline.kink_at < outline.end_at else []
+    right = np.stack([outline.end, *knee, outline.start])
     section = np.concatenate([right, right[::-1] * [-1.0, 1.0]])
     return shape.swept_volume(0.0, section) - shape.cavity_volume

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
-from skfem import ElementHex2, MeshHex, MeshHex2
+from skfem import ElementHex2, MeshHex
 
 from rig.mechanics.errors import MechanicsError
+from rig.mechanics.mesh.curved import CurvedHex
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -97,7 +98,7 @@ def rounded_strip(
     ring = (foot.shape[0] - 1) // 2 - columns
     core = 2 * columns
     top, corner = arc[: core + 1], arc[core]
-    share = min(1.2 * columns / (columns + ring), 0.85)
+    share = min(1.1 * columns / (columns + ring), 0.85)
     inner = centre + share * (corner - centre)
     rows = (arc.shape[0] - 1) // 2 - columns
     on_axis = centre + columns / (columns + ring) * (arc[0] - centre)
@@ -113,12 +114,12 @@ def rounded_strip(
     return patches, np.concatenate([axis_ring, axis_core[1:]])
 
 
-# places of the 27 nodes in an element in the order of scikit-fem, vertices first, as lattice offsets
+# where the 27 nodes sit in an element in the order of scikit-fem, vertices first: lattice offsets
 _CORNERS = 8
 _OFFSETS = np.rint(2 * np.asarray(ElementHex2().doflocs)).astype(int)
 
 
-def join(blocks: Sequence[Block]) -> tuple[MeshHex2, dict[str, Indices]]:
+def join(blocks: Sequence[Block]) -> tuple[CurvedHex, dict[str, Indices]]:
     """One conforming second-order mesh of all blocks, and the facets of every named side.
 
     Raises MeshError if a block's elements are inside out both ways round.
@@ -143,7 +144,7 @@ def join(blocks: Sequence[Block]) -> tuple[MeshHex2, dict[str, Indices]]:
         np.ascontiguousarray(corners.reshape(-1, _CORNERS).T),
         sort_t=False,
     )
-    mesh = MeshHex2.from_mesh(linear)
+    mesh = CurvedHex.from_mesh(linear)
     mesh.doflocs[:, mesh.dofs.element_dofs.T] = position[nodes27].transpose(2, 0, 1)
     facet_of = {tuple(key): number for number, key in enumerate(np.sort(mesh.facets.T, axis=1))}
     named: dict[str, list[int]] = {}
