@@ -55,7 +55,6 @@ class Edge:
     width_px: float  # 10 % to 90 % width of the transition
     contrast: float  # linear light between part and surroundings, of 255
     length_px: float
-    points: int
 
     @property
     def direction(self) -> FloatArray:
@@ -85,7 +84,8 @@ def straight_runs(outline: FloatArray, width: int, height: int) -> list[FloatArr
     pixels near its line wins, is refitted, and leaves the rest to the next. Short gaps
     (highlights, dents) are bridged. Runs on the frame's border are cuts, not edges.
     """
-    thin = outline[:: max(1, -(-len(outline) // MAX_OUTLINE_POINTS))]
+    stride = max(1, -(-len(outline) // MAX_OUTLINE_POINTS))
+    thin = outline[::stride]
     free = (
         (thin[:, 0] > 1) & (thin[:, 1] > 1) & (thin[:, 0] < width - 2) & (thin[:, 1] < height - 2)
     )
@@ -104,6 +104,8 @@ def straight_runs(outline: FloatArray, width: int, height: int) -> list[FloatArr
         runs.append(points)
         free = free.copy()
         free[run] = False
+        if np.sqrt(2.0) * stride * free.sum() < LONG_SHARE * _extent(runs[0]):
+            break  # what is left of the outline is too short
     return runs
 
 
@@ -137,26 +139,33 @@ def _longest(
 
     A stretch may have gaps of at most `gap` points; lines are (m, 2) centres and normals.
     """
-    count = len(outline)
     distance = np.abs(normals @ outline.T - (centres * normals).sum(axis=1)[:, None])
     close = (distance < RUN_TOLERANCE_PX) & free
-    if len(close) > CONTESTANTS:  # gaps can only lower the count, so few need the closer look
-        close = close[np.argsort(-close.sum(axis=1), kind="stable")[:CONTESTANTS]]
-    # the outline is closed: look at it twice round, but at no stretch longer than once
-    twice = np.concatenate([close, close], axis=1)
-    column = np.arange(2 * count)
-    seen = np.maximum.accumulate(np.where(twice, column, -1), axis=1)
-    before = np.concatenate([np.full((len(close), 1), -1), seen[:, :-1]], axis=1)
-    opens = twice & ((before < 0) | (column - before > gap + 1))
-    begin = np.maximum.accumulate(np.where(opens, column, 0), axis=1)
-    total = np.cumsum(twice, axis=1)
-    size = np.where(twice, total - np.take_along_axis(total, begin, axis=1) + 1, 0)
-    size[column - begin >= count] = 0
-    row, last = np.unravel_index(int(np.argmax(size)), size.shape)
-    if size[row, last] == 0:
-        return np.empty(0, dtype=np.intp)
-    stretch = np.arange(begin[row, last], last + 1)
-    members: NDArray[np.intp] = stretch[twice[row, stretch]] % count
+    counts = close.sum(axis=1)
+    best = np.empty(0, dtype=np.intp)
+    for row in np.argsort(-counts, kind="stable")[:CONTESTANTS]:
+        if counts[row] <= len(best):
+            break  # gaps can only lower the count
+        stretch = _longest_stretch(close[row], gap)
+        if len(stretch) > len(best):
+            best = stretch
+    return best
+
+
+def _longest_stretch(close: NDArray[np.bool_], gap: int) -> NDArray[np.intp]:
+    """Positions of True on a closed outline, in the stretch with most of them, in order."""
+    hits = np.flatnonzero(close)
+    if len(hits) == 0:
+        return hits
+    steps = np.diff(hits, append=hits[0] + len(close))
+    cuts = np.flatnonzero(steps > gap + 1)
+    if len(cuts) == 0:
+        return hits
+    sizes = np.diff(cuts, prepend=cuts[-1] - len(hits))
+    longest = int(np.argmax(sizes))
+    members: NDArray[np.intp] = hits[
+        np.arange(cuts[longest] - sizes[longest] + 1, cuts[longest] + 1) % len(hits)
+    ]
     return members
 
 
@@ -198,7 +207,6 @@ def _refine(
         width_px=width,
         contrast=float(np.median(contrast[good])),
         length_px=length,
-        points=int(good.sum()),
     )
 
 

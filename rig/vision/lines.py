@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import atan2, cos, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,6 @@ class LineFit:
     direction: FloatArray
     u_direction_rad: float  # standard uncertainty of the direction from the residuals
     rms_px: float  # weighted scatter of the points across the line
-    inlier_fraction: float  # share of points closer than three robust standard deviations
     offsets_px: FloatArray  # (n,) signed distance of every point from the line
 
 
@@ -50,7 +50,6 @@ def fit_line(points: FloatArray, weights: FloatArray) -> LineFit:
             robust = weights * (1.0 - ratio**2) ** 2
         centre, direction, offsets = plain_line(points, robust)
     along = (points - centre) @ direction
-    inlier = np.abs(offsets) < 3.0 * scale
     total = float(robust.sum())
     variance = float((robust * offsets**2).sum()) / total * len(points) / max(len(points) - 2, 1)
     spread = float((robust * along**2).sum()) / total
@@ -60,7 +59,6 @@ def fit_line(points: FloatArray, weights: FloatArray) -> LineFit:
         direction=direction,
         u_direction_rad=float(u_direction),
         rms_px=float(np.sqrt(variance)),
-        inlier_fraction=float(inlier.mean()),
         offsets_px=offsets,
     )
 
@@ -72,15 +70,17 @@ def plain_line(
 
     The direction runs from the first point to the last.
     """
-    centre = (weights @ points) / weights.sum()
-    arms = points - centre
-    (xx, xy), (_, yy) = (arms * weights[:, None]).T @ arms
-    half = 0.5 * np.arctan2(2.0 * xy, xx - yy)  # principal axis of a 2x2 scatter matrix
-    direction = np.array([np.cos(half), np.sin(half)])
-    if direction @ (points[-1] - points[0]) < 0.0:
-        direction = -direction
-    offsets = arms[:, 1] * direction[0] - arms[:, 0] * direction[1]
-    return centre, direction, offsets
+    x, y = points[:, 0], points[:, 1]
+    total = float(weights.sum())
+    middle_x, middle_y = float(weights @ x) / total, float(weights @ y) / total
+    x, y = x - middle_x, y - middle_y
+    weighted_x, weighted_y = weights * x, weights * y
+    scatter = float(weighted_x @ x), float(weighted_x @ y), float(weighted_y @ y)
+    half = 0.5 * atan2(2.0 * scatter[1], scatter[0] - scatter[2])  # axis of a 2x2 scatter matrix
+    along, across = cos(half), sin(half)
+    if along * (x[-1] - x[0]) + across * (y[-1] - y[0]) < 0.0:
+        along, across = -along, -across
+    return np.array([middle_x, middle_y]), np.array([along, across]), y * along - x * across
 
 
 def _median(values: FloatArray) -> float:

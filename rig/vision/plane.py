@@ -115,8 +115,9 @@ def rectify(
     parameters = (np.asarray(start, dtype=np.float64) / start[2, 2]).ravel()[:8]
     for _ in range(GAUSS_NEWTON_STEPS):
         predicted, jacobian = _project(parameters, grid)
-        misses = (pixels - predicted).ravel()
-        parameters = parameters + np.linalg.pinv(jacobian) @ misses
+        parameters = (
+            parameters + _normal_inverse(jacobian) @ jacobian.T @ (pixels - predicted).ravel()
+        )
     predicted, jacobian = _project(parameters, grid)
     freedom = 2 * len(grid) - 8
     misfit = float(((pixels - predicted) ** 2).sum())
@@ -131,7 +132,7 @@ def rectify(
         camera,
         Rectification(
             homography=np.append(parameters, 1.0).reshape(3, 3),
-            covariance=(variance * np.linalg.pinv(jacobian.T @ jacobian)).astype(np.float64),
+            covariance=variance * _normal_inverse(jacobian),
             residual_px=residual,
             pitch_mm=ruler.pitch * 1e3,
             squareness_u_rad=float(np.radians(ruler.squareness_u_deg)),
@@ -160,6 +161,13 @@ def _project(parameters: FloatArray, grid: FloatArray) -> tuple[FloatArray, Floa
     rows_v = np.stack([zero, zero, zero, x, y, one, -v * x, -v * y], axis=1) / depth[:, None]
     jacobian = np.stack([rows_u, rows_v], axis=1).reshape(-1, 8)
     return np.stack([u, v], axis=1), jacobian
+
+
+def _normal_inverse(jacobian: FloatArray) -> FloatArray:
+    try:
+        return np.asarray(np.linalg.inv(jacobian.T @ jacobian), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        raise UntrustedFrameError("ruler marks do not span a plane") from None
 
 
 def _to_plane(homographies: FloatArray, ideal: FloatArray) -> FloatArray:

@@ -27,7 +27,8 @@ MIN_CIRCULARITY = 0.65  # 4 pi A / P^2 of a pixelated disc is about 0.8
 STEP_TOLERANCE = 0.2  # of the step: perspective and lens change neighbouring steps much less
 MIN_CORNER_DEG, MAX_CORNER_DEG = 60.0, 120.0
 MAX_CANDIDATES = 80
-PAPER_PX = (2.0, 4.0)  # ring of white paper beyond a mark's radius
+LUMA = np.array([0.114, 0.587, 0.299])  # of B, G, R: what JPEG keeps at full resolution
+PAPER = (1.25, 1.75)  # ring of white paper around a mark, in radii
 
 
 @dataclass(frozen=True)
@@ -63,8 +64,7 @@ def find_ruler(levels: list[Image], marks: int) -> RulerMarks:
     indices = [corner, *first.values(), *second.values()]
     grid = [(0, 0), *((k, 0) for k in first), *((0, k) for k in second)]
     radius = 0.5 * float(np.median(diameters[indices]))
-    grey = as_image(cv2.cvtColor(levels[0], cv2.COLOR_BGR2GRAY))
-    pixels = _centres(grey, rough[indices], radius)
+    pixels = _centres(levels[0], rough[indices], radius)
     return RulerMarks(pixels=pixels, grid=np.array(grid, dtype=np.float64))
 
 
@@ -146,26 +146,35 @@ def _walk(points: FloatArray, corner: int, neighbour: int, marks: int) -> Leg | 
     return leg if max(leg) == marks and len(leg) >= marks - 1 else None
 
 
-def _centres(grey: Image, rough: FloatArray, radius: float) -> FloatArray:
+def _centres(image: Image, rough: FloatArray, radius: float) -> FloatArray:
     """Centroids (n, 2) of the light that each mark takes away; even blur does not move them.
 
-    The paper around gives the white level as a plane, so that a light gradient does not pull.
+    The paper around gives the white level as a plane, so that a light gradient does not pull; on
+    a ring about the mark its three terms are orthogonal.
     """
-    reach = int(np.ceil(radius + PAPER_PX[1]))
+    inner, outer = PAPER[0] * radius + 1.0, PAPER[1] * radius + 1.0
+    reach = int(np.ceil(outer))
     steps = np.arange(-reach, reach + 1)
     middle = np.rint(rough).astype(int)
-    rows = np.clip(middle[:, 1, None] + steps, 0, grey.shape[0] - 1)[:, :, None]
-    columns = np.clip(middle[:, 0, None] + steps, 0, grey.shape[1] - 1)[:, None, :]
-    light = to_light(grey[rows, columns].astype(np.float64))  # (n, k, k)
-    x, y = np.broadcast_arrays(columns - rough[:, 0, None, None], rows - rough[:, 1, None, None])
-    away = np.hypot(x, y)
-    paper = (away > radius + PAPER_PX[0]) & (away < radius + PAPER_PX[1])
-    terms = np.stack([np.ones_like(x), x, y], axis=-1).reshape(len(rough), -1, 3)
-    weighted = (terms * paper.reshape(len(rough), -1, 1)).mT
-    white = np.linalg.solve(weighted @ terms, weighted @ light.reshape(len(rough), -1, 1))
-    missing = 1.0 - light / np.maximum((terms @ white).reshape(light.shape), 1.0)
-    missing[away > radius + PAPER_PX[0]] = 0.0
-    total = np.maximum(missing.sum(axis=(1, 2)), 1.0)
-    pull = np.stack([(missing * x).sum(axis=(1, 2)), (missing * y).sum(axis=(1, 2))], axis=1)
-    centres: FloatArray = rough + pull / total[:, None]
+    rows = np.clip(middle[:, 1, None] + steps, 0, image.shape[0] - 1)
+    columns = np.clip(middle[:, 0, None] + steps, 0, image.shape[1] - 1)
+    patches = image[rows[:, :, None], columns[:, None, :]]  # (n, k, k, 3)
+    light = to_light(patches.reshape(-1, 3) @ LUMA).reshape(patches.shape[:3])
+    x = (columns - rough[:, 0, None])[:, None, :]
+    y = (rows - rough[:, 1, None])[:, :, None]
+    away = x**2 + y**2
+    paper = (away > inner**2) & (away < outer**2)
+    weight = paper / np.maximum(paper.sum(axis=(1, 2), keepdims=True), 1)
+    level = (weight * light).sum(axis=(1, 2), keepdims=True)
+    white = weight * (light - level)
+    slope_x = (white * x).sum(axis=(1, 2), keepdims=True)
+    slope_y = (white * y).sum(axis=(1, 2), keepdims=True)
+    spread = 0.5 * (weight * away).sum(axis=(1, 2), keepdims=True)
+    plane = level + (slope_x * x + slope_y * y) / np.maximum(spread, 1.0)
+    missing = 1.0 - light / np.maximum(plane, 1.0)
+    missing[away > inner**2] = 0.0
+    down, across = missing.sum(axis=2), missing.sum(axis=1)
+    total = np.maximum(down.sum(axis=1), 1.0)
+    pull = [(across * x[:, 0]).sum(axis=1), (down * y[:, :, 0]).sum(axis=1)]
+    centres: FloatArray = rough + np.stack(pull, axis=1) / total[:, None]
     return centres

@@ -141,7 +141,7 @@ def test_a_soft_frame_is_measured_at_half_its_size_in_its_own_pixels(meter):
     sharp, soft = (meter.measure(render(Scene(blur=blur))) for blur in (0.8, 3.5))
     assert soft.accepted, soft.reason
     assert abs(soft.angle_deg - 40.0) < 3.0 * soft.u_deg
-    assert soft.scale_mm_per_px == pytest.approx(sharp.scale_mm_per_px, rel=1e-3)
+    assert soft.scale_mm_per_px == pytest.approx(sharp.scale_mm_per_px, rel=5e-3)
     assert np.abs(soft.geometry.ruler_marks - sharp.geometry.ruler_marks).max() < 0.3
     middles = [r.geometry.cap.outline.mean(axis=0) for r in (sharp, soft)]
     assert np.abs(middles[0] - middles[1]).max() < 3.0

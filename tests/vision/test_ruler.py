@@ -24,7 +24,7 @@ def test_marks_are_found_to_a_fraction_of_a_pixel(seed):
     marks = find_ruler(pyramid(render(scene)), 7)
     assert len(marks.grid) == 15
     misses = marks.pixels - true_pixels(scene, marks)
-    assert np.sqrt((misses**2).sum(axis=1).mean()) < 0.05
+    assert np.sqrt((misses**2).sum(axis=1).mean()) < 0.03
 
 
 def test_the_grid_starts_in_the_corner_and_is_not_mirrored():
