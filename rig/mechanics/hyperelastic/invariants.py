@@ -140,13 +140,18 @@ def _tangent_of_both(f: Array, k: _Kinematics, w: Slopes, out: Array) -> None:
         )
     )
     sum_of_dyads(left, right, out)
-    add_identity(out, 2 * k.a * (w.by_1 + w.by_2 * k.i1))
     add_cofactor_slope(out, (-2 / 3 * w.by_1 * k.i1 - 4 / 3 * w.by_2 * k.i2) / k.j, f)
-    # what is left of d2I2/dF2: -2 a^2 (d_ik C_jl + B_ik d_jl + F_il F_kj)
+    # what is left: -2 a^2 W_2 (d_ik C_jl + B_ik d_jl + F_il F_kj) + 2 a (W_1 + W_2 I1) d_ik d_jl
     minus = -2 * k.a**2 * w.by_2
     c = minus * right_cauchy_green(f)
     b = minus * left_cauchy_green(f)
+    unit = 2 * k.a * (w.by_1 + w.by_2 * k.i1)
+    for i in range(3):
+        c[i, i] += unit
+    scaled, turned = minus * f, f.swapaxes(0, 1)
+    row = np.empty((3, *f.shape), dtype=f.dtype)  # a third of the tangent: fits the cache
     for i in range(3):
         out[i, :, i] += c
         out[:, i, :, i] += b
-    out += (minus * f)[:, None, None] * f.swapaxes(0, 1)[None, :, :, None]
+        np.multiply(scaled[i], turned[:, :, None], out=row)
+        out[i] += row

@@ -14,7 +14,6 @@ from rig.mechanics.hyperelastic.protocol import Array
 BLOCK = 1024
 """Points worked on at once: their tangents, 81 numbers each, stay in the processor's cache."""
 
-_NEXT = ((1, 2), (2, 0), (0, 1))
 _SIGN = {(0, 1, 2): 1, (1, 2, 0): 1, (2, 0, 1): 1, (2, 1, 0): -1, (1, 0, 2): -1, (0, 2, 1): -1}
 
 
@@ -37,11 +36,12 @@ def in_blocks(f: Array, rank: int, compute: Callable[[Array, Array], None]) -> A
 
 def cofactor(f: Array) -> Array:
     """cof F = det(F) F^-T = dJ/dF, (3, 3, n); also where F is singular."""
-    result = np.empty_like(f)
-    for i, (j, k) in enumerate(_NEXT):
-        for a, (b, c) in enumerate(_NEXT):
-            np.multiply(f[j, b], f[k, c], out=result[i, a])
-            result[i, a] -= f[j, c] * f[k, b]
+    around = np.empty((5, 5, f.shape[-1]), dtype=f.dtype)  # F repeated: rolled rows are slices
+    around[:3, :3] = f
+    around[3:, :3] = f[:2]
+    around[:, 3:] = around[:, :2]
+    result: Array = around[1:4, 1:4] * around[2:, 2:]
+    result -= around[1:4, 2:] * around[2:, 1:4]
     return result
 
 
@@ -59,20 +59,13 @@ def square(f: Array) -> Array:
 
 def right_cauchy_green(f: Array) -> Array:
     """C = F^T F, (3, 3, n)."""
-    return _symmetric_product(f.swapaxes(0, 1))
+    result: Array = np.einsum("kin,kjn->ijn", f, f)
+    return result
 
 
 def left_cauchy_green(f: Array) -> Array:
     """B = F F^T, (3, 3, n)."""
-    return _symmetric_product(f)
-
-
-def _symmetric_product(f: Array) -> Array:
-    result = np.empty(f.shape, dtype=f.dtype)
-    for i in range(3):
-        for j in range(i, 3):
-            result[i, j] = f[i, 0] * f[j, 0] + f[i, 1] * f[j, 1] + f[i, 2] * f[j, 2]
-            result[j, i] = result[i, j]
+    result: Array = np.einsum("ikn,jkn->ijn", f, f)
     return result
 
 
