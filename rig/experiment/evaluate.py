@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.record.documents import AngleReading, PointDocument, PointKey
-from rig.spec.calibration import CameraCalibration, LoadCellCalibration
+from rig.spec.calibration import LoadCellCalibration
 
 HAMPEL_LIMIT = 6.0
 """A load-cell reading this many robust standard deviations off the median is a bad word."""
@@ -40,13 +40,11 @@ class CellReading:
     status: str
 
 
-def angle_point(
-    visit: Visit, readings: Sequence[AngleReading], camera: CameraCalibration
-) -> PointDocument:
+def angle_point(visit: Visit, readings: Sequence[AngleReading]) -> PointDocument:
     """The bending angle of a point in degrees from the vision results of its frames.
 
-    The fit uncertainty that vision states for a frame has parts common to all frames of a still
-    scene (shading, edges), so it is not reduced by averaging.
+    The uncertainty that vision states for a frame holds the camera's calibration and parts common
+    to all frames of a still scene (shading, edges), so it is not reduced by averaging.
     """
     accepted = [r for r in readings if r.accepted and r.angle_deg is not None]
     angles = np.array([r.angle_deg for r in accepted], dtype=np.float64)
@@ -55,7 +53,7 @@ def angle_point(
         value = float(angles.mean())
         spread = float(angles.std(ddof=1)) if len(angles) > 1 else 0.0
         vision_u = float(np.mean([r.u_deg for r in accepted]))
-        u = float(np.sqrt(spread**2 / len(angles) + vision_u**2 + camera.angle_u_deg**2))
+        u = float(np.sqrt(spread**2 / len(angles) + vision_u**2))
     rejected = tuple(r.reason for r in readings if not r.accepted)
     return _document(visit, "deg", value, spread, u, len(angles), rejected)
 

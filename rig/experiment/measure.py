@@ -16,7 +16,7 @@ from rig.link.client import Message, RigLink
 from rig.link.schema import Schema
 from rig.record.documents import AngleReading, PointDocument, PointKey
 from rig.record.writer import RunWriter
-from rig.spec.calibration import CameraCalibration, LoadCellCalibration
+from rig.spec.calibration import LoadCellCalibration
 from rig.vision.measure import AngleMeter
 
 RETRY_FACTOR = 2
@@ -64,7 +64,6 @@ class AngleMeasurement:
 
     camera: Camera
     meter: AngleMeter
-    calibration: CameraCalibration
     frames: int
     frame_period_s: float
 
@@ -84,7 +83,7 @@ class AngleMeasurement:
             record.image(time_s, jpeg, arrival.key, reading.frame)
             record.angle(reading, time_s)
             readings.append(reading)
-        return angle_point(arrival.visit(from_s, messages), readings, self.calibration)
+        return angle_point(arrival.visit(from_s, messages), readings)
 
 
 @dataclass(frozen=True)

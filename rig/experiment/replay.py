@@ -99,7 +99,7 @@ class ReplayedRun(RunReader):
                 pressure_kpa=pressure["pressure_kpa"][inside],
             )
             if point.key.experiment == "deformation":
-                yield angle_point(visit, by_key[point.key], self._calibrations.camera)
+                yield angle_point(visit, by_key[point.key])
             else:
                 chosen = _within(point, cell["time_s"])
                 readings = [

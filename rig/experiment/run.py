@@ -220,7 +220,6 @@ def _measurement(context: RunContext, experiment: ExperimentName) -> Measurement
         return AngleMeasurement(
             camera=context.bench.camera,
             meter=AngleMeter(calibrations.camera, calibrations.ruler),
-            calibration=calibrations.camera,
             frames=section.frames,
             frame_period_s=1 / setup.bench.camera.frame_rate,
         )

@@ -9,23 +9,11 @@ import pytest
 
 from rig.experiment.evaluate import CellReading, Visit, angle_point, force_point
 from rig.record.documents import AngleReading, PointKey
-from rig.spec.calibration import CameraCalibration, LoadCellCalibration, Provenance
+from rig.spec.calibration import LoadCellCalibration, Provenance
 
 KEY = PointKey(experiment="deformation", repeat=1, direction="up", target_kpa=3.0)
 VISIT = Visit(KEY, 0.0, 1.0, 31.0, 32.0, np.array([2.99, 3.01, 3.00]))
 PROVENANCE = Provenance(date=date(2026, 1, 1), method="test", instrument="none")
-CAMERA = CameraCalibration(
-    kind="calibration",
-    instrument="camera",
-    width=1280,
-    height=720,
-    focal_x=2240,
-    focal_y=2240,
-    centre_x=640,
-    centre_y=360,
-    angle_u_deg=0.04,
-    provenance=PROVENANCE,
-)
 CELL = LoadCellCalibration.model_validate(
     {
         "kind": "calibration",
@@ -51,17 +39,17 @@ def frame(angle: float | None, u: float = 0.03, reason: str = "") -> AngleReadin
 
 
 def test_an_angle_is_the_mean_of_the_accepted_frames() -> None:
-    point = angle_point(VISIT, [frame(30.0), frame(30.2), frame(90.0, reason="blurred")], CAMERA)
+    point = angle_point(VISIT, [frame(30.0), frame(30.2), frame(90.0, reason="blurred")])
     assert point.value == pytest.approx(30.1)
     assert point.readings == 2
     assert point.rejected == ("blurred",)
     assert point.pressure_kpa == pytest.approx(3.0)
-    # 0.2 apart: s = 0.1414, s / sqrt(2) = 0.1; with 0.03 (vision) and 0.04 (camera)
-    assert point.value_u == pytest.approx(np.sqrt(0.1**2 + 0.03**2 + 0.04**2))
+    # 0.2 apart: s = 0.1414, s / sqrt(2) = 0.1; with 0.03 from vision
+    assert point.value_u == pytest.approx(np.hypot(0.1, 0.03))
 
 
 def test_a_point_without_a_good_frame_has_no_value() -> None:
-    point = angle_point(VISIT, [frame(None, reason="no end cap")], CAMERA)
+    point = angle_point(VISIT, [frame(None, reason="no end cap")])
     assert point.value is None
     assert point.readings == 0
 
