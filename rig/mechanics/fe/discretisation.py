@@ -171,12 +171,14 @@ def discretise(mesh: Any, kinematics: Kinematics = Kinematics.SOLID) -> Discreti
     _check_orientation(mesh, basis)
     nodes = np.ascontiguousarray(basis.doflocs.T)
     connectivity = np.ascontiguousarray(basis.element_dofs.T).astype(np.int64)
-    values = np.stack([np.broadcast_to(b[0].value, basis.dx.shape) for b in basis.basis], axis=-1)
+    values = np.stack(
+        [np.broadcast_to(np.asarray(b[0]), basis.dx.shape) for b in basis.basis], axis=-1
+    )
     gradient = np.stack([np.moveaxis(b[0].grad, 0, -1) for b in basis.basis], axis=-1)
     weights = np.array(basis.dx)
     gradients: tuple[Array, ...] = (gradient,) * dim
     if kinematics is Kinematics.AXISYMMETRIC:
-        radius = np.asarray(basis.global_coordinates().value)[0]
+        radius = np.asarray(basis.global_coordinates())[0]
         weights *= 2 * np.pi * radius
         hoop = values / radius[..., None]
         gradients = (np.concatenate((gradient, hoop[:, :, None]), axis=2), gradient)
@@ -207,10 +209,10 @@ def _pressure_space(basis: Any, weights: Array) -> tuple[Array, Integers | None,
     if _CONTINUOUS[type(element)]:
         linear = basis.with_element(_LINEAR_PRESSURE[type(element)]())
         values = np.stack(
-            [np.broadcast_to(b[0].value, weights.shape) for b in linear.basis], axis=-1
+            [np.broadcast_to(np.asarray(b[0]), weights.shape) for b in linear.basis], axis=-1
         )
         return values, np.ascontiguousarray(linear.element_dofs.T).astype(np.int64), int(linear.N)
-    points = np.moveaxis(np.asarray(basis.global_coordinates().value), 0, -1)  # (e, q, dim)
+    points = np.moveaxis(np.asarray(basis.global_coordinates()), 0, -1)  # (e, q, dim)
     volume = weights.sum(axis=1)
     centre = np.einsum("eq,eqi->ei", weights, points) / volume[:, None]
     size = volume ** (1 / 3)

@@ -28,8 +28,10 @@ def traction(discretisation: Discretisation, facets: Integers, stress: Array) ->
     basis = skfem.FacetBasis(d.mesh, d.element, facets=facets, intorder=5)
     weights = np.array(basis.dx)
     if d.kinematics is Kinematics.AXISYMMETRIC:
-        weights *= 2 * np.pi * np.asarray(basis.global_coordinates().value)[0]
-    values = np.stack([np.broadcast_to(b[0].value, weights.shape) for b in basis.basis], axis=-1)
+        weights *= 2 * np.pi * np.asarray(basis.global_coordinates())[0]
+    values = np.stack(
+        [np.broadcast_to(np.asarray(b[0]), weights.shape) for b in basis.basis], axis=-1
+    )
     per_node = np.einsum("fq,fqa->fa", weights, values)
     forces = per_node[..., None] * np.asarray(stress, dtype=float)
     return _scattered(d, basis.element_dofs.T.astype(np.int64), forces)

@@ -63,6 +63,8 @@ class Assembly:
     """Volume of the cavity in m3."""
     volume_slope: Array
     """Derivative of that volume by the displacements in m2."""
+    volume_error: float
+    """Largest volume ratio less that of the pressure, weighted with a pressure shape function."""
     scale: float
     """Size of the element forces that balance in the residual, N."""
     evaluations: tuple[Evaluation, ...]
@@ -104,6 +106,7 @@ class Model:
         self.items = tuple(items)
         n = discretisation.size
         self.size = n
+        self._pressure_volume = _pressure_volume(discretisation)
         self.dead_load = np.zeros(n) if dead_load is None else np.asarray(dead_load, dtype=float)
         covered = np.sort(np.concatenate([s.elements for s in self.solids]))
         if not np.array_equal(covered, np.arange(len(discretisation.connectivity))):
@@ -185,13 +188,18 @@ class Model:
             force, stiffness = item.evaluate(x)
             residual += np.bincount(item.dofs.reshape(-1), weights=force.reshape(-1), minlength=n)
             blocks.append(stiffness)
+        n_u = self.discretisation.displacement_size
+        errors = [e.volume_error for e in evaluations]
+        if n > n_u:
+            errors.append(float((np.abs(residual[n_u:]) / self._pressure_volume).max()))
         return Assembly(
             residual=residual,
             data=self.pattern.assemble(blocks) if tangent else None,
             pressure_slope=pressure_slope,
             volume=volume,
             volume_slope=volume_slope,
-            scale=float(np.linalg.norm(scale[: self.discretisation.displacement_size])),
+            volume_error=max(errors),
+            scale=float(np.linalg.norm(scale[:n_u])),
             evaluations=evaluations,
         )
 
@@ -241,6 +249,17 @@ class Model:
         for body, pose in zip(self.bodies, state.poses, strict=True):
             x[body.dofs] = body.displacements(pose)
         return replace(state, x=x)
+
+
+def _pressure_volume(d: Discretisation) -> Array:
+    """Volume in m3 that each continuous pressure stands for."""
+    if d.pressure_connectivity is None:
+        return np.zeros(0)
+    parts = np.einsum("eq,eqm->em", d.weights, d.pressure_values)
+    total: Array = np.bincount(
+        d.pressure_connectivity.reshape(-1), parts.reshape(-1), minlength=d.pressure_nodes
+    ).astype(np.float64)
+    return total
 
 
 def _no_dofs() -> Integers:

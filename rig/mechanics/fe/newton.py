@@ -123,6 +123,7 @@ def solve_step(
         arrived = (
             residual <= options.tolerance
             and assembly.gap <= 0.3 * options.tolerance**0.5
+            and assembly.volume_error <= options.tolerance
             and control_error <= 10 * options.tolerance
             and len(record) > 0
         )

@@ -76,7 +76,9 @@ class PressureSurface:
         self._dim = d.dim
         self.origin = np.zeros(d.dim) if origin is None else np.asarray(origin, dtype=float)
         basis = skfem.FacetBasis(d.mesh, d.element, facets=facets, intorder=_ORDER)
-        value = np.stack([np.broadcast_to(b[0].value, basis.dx.shape) for b in basis.basis], -1)
+        value = np.stack(
+            [np.broadcast_to(np.asarray(b[0]), basis.dx.shape) for b in basis.basis], -1
+        )
         slope = np.stack([np.moveaxis(b[0].grad, 0, 2) for b in basis.basis], -1)  # (f, q, dim, a)
         # shape functions that vanish on the facet do not matter: keep those of its own nodes
         size = np.abs(value).max(axis=1)
