@@ -13,9 +13,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from rig.report.build import build_report
-
 from rig.record.reader import RunReader
+from rig.report.build import build_report
 
 ROOT = Path(__file__).resolve().parents[2]
 RIG = [sys.executable, "-c", "from rig.cli.main import main; main()"]
