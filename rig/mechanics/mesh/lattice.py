@@ -1,8 +1,8 @@
 """Structured second-order blocks: lattices of nodes, and one conforming mesh made of many.
 
-A block of a x b x c hexahedra is an array (2a+1, 2b+1, 2c+1, 3): corners at even indices, nodes of
-the 27-node element between them. Blocks that share a face share its node positions; they are
-joined by position.
+A block of a x b x c hexahedra is an array (2a+1, 2b+1, 2c+1, 3): corners at even indices, the other
+nodes of the 27-node element between them; likewise a block of quadrilaterals. Blocks that share a
+face share its node positions; they are joined by position.
 """
 
 from __future__ import annotations
@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
-from skfem import ElementHex2, MeshHex
+from skfem import ElementHex2, ElementQuad2, MeshHex, MeshQuad
 
-from rig.mechanics.errors import MechanicsError
-from rig.mechanics.mesh.curved import CurvedHex
+from rig.mechanics.mesh.curved import CurvedHex, CurvedQuad
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -29,26 +28,24 @@ JOIN_TOLERANCE = 1e-9
 """Nodes closer than this are one node, metres: a thousandth of a micrometre."""
 
 
-class MeshError(MechanicsError):
-    """A mesh cannot be made: an element would be inverted, or blocks do not fit together."""
-
-
 @dataclass(frozen=True)
 class Block:
     """A lattice of nodes, metres, with names for some of its sides."""
 
     nodes: Array
-    """(2a+1, 2b+1, 2c+1, 3)."""
+    """(2a+1, 2b+1, 2c+1, 3), or (2a+1, 2b+1, 2)."""
     names: dict[Side, str] = field(default_factory=dict)
 
-    def shifted(self, x: float) -> Block:
-        """The block moved along the axis by `x` metres."""
-        return Block(self.nodes + np.array([x, 0.0, 0.0]), self.names)
+    def shifted(self, by: float, axis: int = 0) -> Block:
+        """The block moved along an axis by so many metres."""
+        nodes = self.nodes.copy()
+        nodes[..., axis] += by
+        return Block(nodes, self.names)
 
-    def mirrored(self, x: float) -> Block:
-        """The block mirrored in the plane of constant `x`, metres."""
-        nodes = self.nodes * np.array([-1.0, 1.0, 1.0])
-        nodes[..., 0] += 2 * x
+    def mirrored(self, at: float, axis: int = 0) -> Block:
+        """The block mirrored in the plane where the coordinate of an axis is `at`, metres."""
+        nodes = self.nodes.copy()
+        nodes[..., axis] = 2 * at - nodes[..., axis]
         return Block(nodes, self.names)
 
 
@@ -114,57 +111,66 @@ def rounded_strip(
     return patches, np.concatenate([axis_ring, axis_core[1:]])
 
 
-# where the 27 nodes sit in an element in the order of scikit-fem, vertices first: lattice offsets
-_CORNERS = 8
-_OFFSETS = np.rint(2 * np.asarray(ElementHex2().doflocs)).astype(int)
+# where the nodes of an element sit in the order of scikit-fem, vertices first: lattice offsets
+_OFFSETS = {
+    2: np.rint(2 * np.asarray(ElementQuad2().doflocs)).astype(int),
+    3: np.rint(2 * np.asarray(ElementHex2().doflocs)).astype(int),
+}
 
 
-def join(blocks: Sequence[Block]) -> tuple[CurvedHex, dict[str, Indices]]:
+def join(blocks: Sequence[Block]) -> tuple[CurvedHex | CurvedQuad, dict[str, Indices]]:
     """One conforming second-order mesh of all blocks, and the facets of every named side.
 
-    Raises MeshError if a block's elements are inside out both ways round.
+    Blocks of points in space make hexahedra, blocks of points in a plane quadrilaterals.
     """
+    dim = blocks[0].nodes.shape[-1]
     blocks = [_right_handed(block) for block in blocks]
-    points = np.concatenate([block.nodes.reshape(-1, 3) for block in blocks])
-    _, unique = _merged(points)
-    starts = np.cumsum([0] + [block.nodes[..., 0].size for block in blocks])
+    points = np.concatenate([block.nodes.reshape(-1, dim) for block in blocks])
+    unique = _merged(points)
+    sizes = [block.nodes[..., 0].size for block in blocks]
+    starts = np.cumsum([0, *sizes])
     elements, sides = [], []
-    for block, start in zip(blocks, starts, strict=False):
-        index = unique[start + np.arange(block.nodes[..., 0].size)].reshape(block.nodes.shape[:3])
+    for block, start, size in zip(blocks, starts, sizes, strict=False):
+        index = unique[start : start + size].reshape(block.nodes.shape[:-1])
         elements.append(_elements(index))
         sides += [(name, _side_corners(index, side)) for side, name in block.names.items()]
-    nodes27 = np.concatenate(elements)
-    position = np.empty((unique.max() + 1, 3))
+    nodes = np.concatenate(elements)
+    position = np.empty((unique.max() + 1, dim))
     position[unique] = points
-    used, corners = np.unique(nodes27[:, :_CORNERS], return_inverse=True)
+    used, corners = np.unique(nodes[:, : 2**dim], return_inverse=True)
     vertex = np.full(position.shape[0], -1)
     vertex[used] = np.arange(used.size)
-    linear = MeshHex(
-        np.ascontiguousarray(position[used].T),
-        np.ascontiguousarray(corners.reshape(-1, _CORNERS).T),
-        sort_t=False,
+    first, second = (MeshHex, CurvedHex) if dim == 3 else (MeshQuad, CurvedQuad)
+    mesh = second.from_mesh(
+        first(
+            np.ascontiguousarray(position[used].T),
+            np.ascontiguousarray(corners.reshape(-1, 2**dim).T),
+            sort_t=False,
+        )
     )
-    mesh = CurvedHex.from_mesh(linear)
-    mesh.doflocs[:, mesh.dofs.element_dofs.T] = position[nodes27].transpose(2, 0, 1)
+    mesh.doflocs[:, mesh.dofs.element_dofs.T] = position[nodes].transpose(2, 0, 1)
     facet_of = {tuple(key): number for number, key in enumerate(np.sort(mesh.facets.T, axis=1))}
     named: dict[str, list[int]] = {}
-    for name, quads in sides:
-        keys = np.sort(vertex[quads], axis=1)
+    for name, facets in sides:
+        keys = np.sort(vertex[facets], axis=1)
         named.setdefault(name, []).extend(facet_of[tuple(key)] for key in keys)
     return mesh, {name: np.unique(facets) for name, facets in named.items()}
 
 
 def _elements(index: Indices) -> Indices:
-    """Node numbers of every element of a lattice, (elements, 27) in scikit-fem's order."""
+    """Node numbers of every element of a lattice in scikit-fem's order, (elements, 9 or 27)."""
     cells = [np.arange(0, size - 1, 2) for size in index.shape]
-    origin = np.stack(np.meshgrid(*cells, indexing="ij"), axis=-1).reshape(-1, 1, 3)
-    at = origin + _OFFSETS
-    return np.asarray(index[at[..., 0], at[..., 1], at[..., 2]])
+    origin = np.stack(np.meshgrid(*cells, indexing="ij"), axis=-1).reshape(-1, 1, index.ndim)
+    at = origin + _OFFSETS[index.ndim]
+    return np.asarray(index[tuple(np.moveaxis(at, -1, 0))])
 
 
 def _side_corners(index: Indices, side: Side) -> Indices:
-    """Node numbers of the corners of every facet on one side of a lattice, (facets, 4)."""
-    face = np.moveaxis(index, "ijk".index(side[0]), 0)[0 if side[1] == "-" else -1][::2, ::2]
+    """Node numbers of the corners of every facet on one side of a lattice, (facets, 2 or 4)."""
+    face = np.moveaxis(index, "ijk".index(side[0]), 0)[0 if side[1] == "-" else -1]
+    if face.ndim == 1:
+        return np.stack([face[:-1:2], face[2::2]], axis=-1)
+    face = face[::2, ::2]
     quads = [face[:-1, :-1], face[1:, :-1], face[1:, 1:], face[:-1, 1:]]
     return np.stack([quad.ravel() for quad in quads], axis=-1)
 
@@ -174,21 +180,19 @@ _FLIPPED: dict[Side, Side] = {"i-": "i+", "i+": "i-"}
 
 def _right_handed(block: Block) -> Block:
     """The block, its first index reversed if its elements are left-handed as they are."""
-    corner = block.nodes[::2, ::2, ::2]
-    i = np.diff(corner, axis=0)[:, :-1, :-1]
-    j = np.diff(corner, axis=1)[:-1, :, :-1]
-    k = np.diff(corner, axis=2)[:-1, :-1, :]
-    volume = np.einsum("...i,...i", np.cross(i, j), k).sum()
-    if volume > 0:
+    dim = block.nodes.shape[-1]
+    corner = block.nodes[(slice(None, None, 2),) * dim]
+    cell = (slice(-1),) * dim
+    edges = np.stack([np.diff(corner, axis=axis, append=0)[cell] for axis in range(dim)], axis=-1)
+    if np.linalg.det(edges).sum() > 0:
         return block
     names = {_FLIPPED.get(side, side): name for side, name in block.names.items()}
     return Block(block.nodes[::-1], names)
 
 
-def _merged(points: Array) -> tuple[int, Indices]:
-    """Number of distinct points, and for every point the number of its distinct one."""
+def _merged(points: Array) -> Indices:
+    """For every point the number of the distinct one it is."""
     pairs = cKDTree(points).query_pairs(JOIN_TOLERANCE, output_type="ndarray")
     size = points.shape[0]
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(size, size))
-    count, label = connected_components(graph, directed=False)
-    return int(count), label
+    return np.asarray(connected_components(graph, directed=False)[1])
