@@ -1,0 +1,1 @@
+"""Solid models of the actuators: one constructive description, faceted or exact."""

@@ -1,0 +1,140 @@
+"""Parts of every geometry family as constructive solids.
+
+Bending bellow: the toolbox's solid exactly (Section II-A of Yao et al. and the toolbox's notes),
+air inlet included. The inlet's place and the connector's outline are nowhere stated: here the
+inlet lies on the revolving axis and goes on through the connector, which is a plate as wide as
+the bottom layer and t more on each side, from the underside to t above the end wall.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.mechanics.bellow import INLET_RADIUS, BellowShape
+from rig.mechanics.cad.construct import Arc, Combined, Line, Part, Point, Prism, Revolved
+from rig.mechanics.mesh.bellow_axisymmetric import AxisymmetricBellow
+from rig.spec.actuator import BellowBendingGeometry
+
+_NO_FLANK = 1e-9
+"""Flanks shorter than this are left out, metres."""
+
+
+def parts_of(geometry: BellowBendingGeometry | AxisymmetricBellow) -> tuple[Part, ...]:
+    """All parts of an actuator, the soft one first."""
+    if isinstance(geometry, AxisymmetricBellow):
+        return (Part("soft", axisymmetric_soft_body(geometry), is_soft=True),)
+    shape = BellowShape.of(geometry)
+    return (
+        Part("soft", bending_soft_body(shape), is_soft=True),
+        Part("connector", _connector(shape), is_soft=False),
+        Part("cap", _end_plate(shape, shape.effective_length + shape.wall), is_soft=False),
+    )
+
+
+def bending_soft_body(shape: BellowShape, *, inlet: bool = True) -> Combined:
+    """Bellow, channel, bottom layer and end walls in one."""
+    length, wall = shape.effective_length, shape.wall
+    cavity = (
+        Revolved(_bellow_profile(shape, 0.0)),
+        Prism(_points(shape.channel_section), 0.0, length),
+    )
+    holes = (_rod(-wall, 0.0, INLET_RADIUS),) if inlet else ()
+    return Combined(
+        added=(
+            Revolved(_bellow_profile(shape, wall)),
+            Prism(_points(shape.solid_section), -wall, length + wall),
+            _rod(-wall, 0.0, shape.end_wall_top),
+            _rod(length, length + wall, shape.end_wall_top),
+        ),
+        removed=(*cavity, *holes),
+    )
+
+
+def axisymmetric_soft_body(shape: AxisymmetricBellow) -> Combined:
+    """Collar, bellows and top, standing on z = 0 and open below."""
+    inner, under = shape.radius - shape.wall, shape.height - shape.wall
+    return Combined(
+        added=(Revolved(_scalloped(shape, shape.radius, shape.height), axis="z"),),
+        removed=(Revolved(_scalloped(shape, inner, under), axis="z"),),
+    )
+
+
+def _connector(shape: BellowShape) -> Combined:
+    near, far = -shape.wall - shape.connector_thickness, -shape.wall
+    side = shape.average_radius + 2 * shape.wall
+    low, high = shape.underside, shape.end_wall_top + shape.wall
+    plate = Prism(((-side, low), (side, low), (side, high), (-side, high)), near, far)
+    return Combined((plate,), (_rod(near, far, INLET_RADIUS),))
+
+
+def _end_plate(shape: BellowShape, start: float) -> Combined:
+    """The rigid end cap: outline of the end wall."""
+    end = start + shape.cap_thickness
+    section = Prism(_points(shape.solid_section), start, end)
+    return Combined((_rod(start, end, shape.end_wall_top), section))
+
+
+def _rod(start: float, end: float, radius: float) -> Revolved:
+    """Cylinder about the x axis."""
+    return Revolved((Line((start, radius), (end, radius)),))
+
+
+def _points(section: NDArray[np.float64]) -> tuple[Point, ...]:
+    return tuple((float(y), float(z)) for y, z in section)
+
+
+def _bellow_profile(shape: BellowShape, offset: float) -> tuple[Line | Arc, ...]:
+    """Inner (offset 0) or outer (offset t) profile of all convolutions from x = 0 to L."""
+    half = shape.half_pitch
+    trough, crest = shape.trough_arc - offset, shape.crest_arc + offset
+    low, high = shape.inner_radius + shape.trough_arc, shape.outer_radius - shape.crest_arc
+    slant = math.sqrt(0.5)
+    pieces: list[Line | Arc] = []
+    for number in range(shape.bellow_number):
+        start, middle, end = 2 * half * number, half * (2 * number + 1), 2 * half * (number + 1)
+        pieces.append(
+            Arc(
+                (start, low - trough),
+                (start + trough * slant, low - trough * slant),
+                (start + trough, low),
+            )
+        )
+        if shape.flank > _NO_FLANK:
+            pieces.append(Line((start + trough, low), (middle - crest, high)))
+        pieces += [
+            Arc(
+                (middle - crest, high),
+                (middle - crest * slant, high + crest * slant),
+                (middle, high + crest),
+            ),
+            Arc(
+                (middle, high + crest),
+                (middle + crest * slant, high + crest * slant),
+                (middle + crest, high),
+            ),
+        ]
+        if shape.flank > _NO_FLANK:
+            pieces.append(Line((middle + crest, high), (end - trough, low)))
+        pieces.append(
+            Arc(
+                (end - trough, low),
+                (end - trough * slant, low - trough * slant),
+                (end, low - trough),
+            )
+        )
+    return tuple(pieces)
+
+
+def _scalloped(shape: AxisymmetricBellow, radius: float, top: float) -> tuple[Line | Arc, ...]:
+    """Profile from z = 0: collar, arcs over chords at `radius`, and on to `top`."""
+    cusps = [shape.collar + number * shape.pitch for number in range(shape.layers + 1)]
+    arcs = [
+        Arc((low, radius), ((low + high) / 2, radius + shape.sagitta), (high, radius))
+        for low, high in pairwise(cusps)
+    ]
+    last = [Line((cusps[-1], radius), (top, radius))] if top - cusps[-1] > 1e-9 else []
+    return (Line((0.0, radius), (shape.collar, radius)), *arcs, *last)

@@ -1,0 +1,40 @@
+"""`rig export` as a person uses it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rig.mechanics.cad.stl import is_watertight, read_stl
+
+from .conftest import Command
+
+ACTUATOR = "models/actuators/bellow-bending.yaml"
+
+
+def test_stl_of_every_part_is_written_and_watertight(rig: Command, tmp_path: Path) -> None:
+    pytest.importorskip("manifold3d")
+    out = tmp_path / "bellow.stl"
+    outcome = rig("export", "--actuator", ACTUATOR, "--stl", out, "--tolerance", "0.1 mm")
+    assert outcome.code == 0
+    for name in ("bellow.stl", "bellow-connector.stl", "bellow-cap.stl"):
+        assert name in outcome.out
+        assert is_watertight(read_stl(tmp_path / name))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        ((), "--stl"),
+        (("--stl", "x.stl", "--tolerance", "2 kPa"), "0.01 mm"),
+        (("--stl", "x.stl", "--tolerance", "0"), "out of range"),
+    ],
+)
+def test_what_cannot_be_exported_is_explained(
+    rig: Command, tmp_path: Path, arguments: tuple[str, ...], word: str
+) -> None:
+    outcome = rig("export", "--actuator", ACTUATOR, *arguments)
+    assert outcome.code != 0
+    assert word in outcome.err
+    assert "Traceback" not in outcome.err
