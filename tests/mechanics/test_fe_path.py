@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -24,13 +25,15 @@ from rig.mechanics.fe import (
     gravity,
     rotation_vector,
 )
-from rig.mechanics.fe.linear import SingularError, SuperLU
+from rig.mechanics.fe.errors import SingularError
+from rig.mechanics.fe.linear import SuperLU
 from rig.mechanics.fe.newton import Target, solve_step
 from rig.mechanics.hyperelastic import NeoHookean, QuadraticVolume
 from tests.mechanics.fe_problems import bending_tube, ring
 
 KPA = 1e3
 PRESSURES = (10 * KPA, 20 * KPA, 30 * KPA)
+SHARP = Options(tolerance=1e-9, correction=0.0)
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +43,7 @@ def tube():
 
 @pytest.fixture(scope="module")
 def inflated(tube):
-    result = follow(tube.model, [Point(p) for p in PRESSURES])
+    result = follow(tube.model, [Point(p) for p in PRESSURES], options=SHARP)
     assert result.failure is None
     return result
 
@@ -51,7 +54,7 @@ def _angles(result) -> np.ndarray:
 
 @pytest.mark.parametrize("mixed_points", [True, False])
 def test_newton_converges_quadratically(tube, mixed_points: bool) -> None:
-    options = Options(tolerance=1e-12, mixed_points=mixed_points, extrapolate=False)
+    options = Options(tolerance=1e-12, correction=0.0, mixed_points=mixed_points, extrapolate=False)
     result = follow(tube.model, [Point(20 * KPA)], options=options)
     assert result.failure is None
     residuals = np.array([i.residual for i in result.history[-1].iterations[1:]])
@@ -63,27 +66,32 @@ def test_newton_converges_quadratically(tube, mixed_points: bool) -> None:
 
 
 def test_mixed_points_and_plain_newton_find_the_same_equilibrium(tube, inflated) -> None:
-    plain = follow(tube.model, [Point(p) for p in PRESSURES], options=Options(mixed_points=False))
+    plain = follow(
+        tube.model, [Point(p) for p in PRESSURES], options=replace(SHARP, mixed_points=False)
+    )
     np.testing.assert_allclose(_angles(plain), _angles(inflated), rtol=1e-7)
     for a, b in zip(plain.solutions, inflated.solutions, strict=True):
         np.testing.assert_allclose(a.state.x, b.state.x, atol=1e-7 * np.abs(a.state.x).max())
 
 
 def test_the_default_tolerance_leaves_no_trace_in_the_angle(tube, inflated) -> None:
-    sharp = follow(tube.model, [Point(p) for p in PRESSURES], options=Options(tolerance=1e-11))
-    np.testing.assert_allclose(_angles(inflated), _angles(sharp), rtol=1e-6)
+    quick = follow(tube.model, [Point(p) for p in PRESSURES])
+    np.testing.assert_allclose(_angles(quick), _angles(inflated), rtol=2e-5)
+    assert quick.solves < inflated.solves
 
 
 def test_volume_control_equals_pressure_control(tube, inflated) -> None:
     volumes = [s.volume for s in inflated.solutions]
-    result = follow(tube.model, [Point(v) for v in volumes], VolumeControl())
+    result = follow(tube.model, [Point(v) for v in volumes], VolumeControl(), options=SHARP)
     assert result.failure is None
     np.testing.assert_allclose([s.pressure for s in result.solutions], PRESSURES, rtol=1e-6)
     np.testing.assert_allclose(_angles(result), _angles(inflated), rtol=1e-6)
 
 
 def test_angle_control_equals_pressure_control(tube, inflated) -> None:
-    result = follow(tube.model, [Point(a) for a in _angles(inflated)], AngleControl())
+    result = follow(
+        tube.model, [Point(a) for a in _angles(inflated)], AngleControl(), options=SHARP
+    )
     assert result.failure is None
     np.testing.assert_allclose([s.pressure for s in result.solutions], PRESSURES, rtol=1e-6)
 
@@ -91,7 +99,7 @@ def test_angle_control_equals_pressure_control(tube, inflated) -> None:
 def test_symmetric_load_stiffness_changes_nothing_but_the_way(inflated) -> None:
     general = bending_tube(symmetric=False)
     assert not general.model.symmetric
-    result = follow(general.model, [Point(p) for p in PRESSURES])
+    result = follow(general.model, [Point(p) for p in PRESSURES], options=SHARP)
     np.testing.assert_allclose(_angles(result), _angles(inflated), rtol=1e-7)
     assert result.solves <= inflated.solves + 1
 
@@ -112,7 +120,7 @@ def test_reactions_balance_pressure_and_weight(tube) -> None:
         dead_load=weight,
         bodies=[tube.cap],
     )
-    solution = follow(model, [Point(15 * KPA)]).solutions[0]
+    solution = follow(model, [Point(15 * KPA)], options=SHARP).solutions[0]
     reaction = solution.residual.reshape(-1, 3)[d.nodes_on("clamp")].sum(axis=0)
     # the tube is open at the clamp: pressure pulls there on the cross section of the cavity
     area = (5e-3 - 1.5e-3) * (10e-3 - 1.5e-3 - 3e-3)
@@ -159,12 +167,16 @@ def _sphere_pressure(bore: float) -> float:
 def test_volume_and_displacement_control_pass_a_limit_point() -> None:
     model, bore = _balloon()
     bores = np.array([1.2, 1.5, 1.9, 2.4, 3.0])
-    by_bore = follow(model, [Point(b - 1) for b in bores], DisplacementControl((bore,)))
+    by_bore = follow(
+        model, [Point(b - 1) for b in bores], DisplacementControl((bore,)), options=SHARP
+    )
     assert by_bore.failure is None
     found = np.array([s.pressure for s in by_bore.solutions])
     np.testing.assert_allclose(found, [_sphere_pressure(b) for b in bores], rtol=2e-3)
     assert found[-1] < found.max()
-    by_volume = follow(model, [Point(s.volume) for s in by_bore.solutions], VolumeControl())
+    by_volume = follow(
+        model, [Point(s.volume) for s in by_bore.solutions], VolumeControl(), options=SHARP
+    )
     assert by_volume.failure is None
     np.testing.assert_allclose([s.pressure for s in by_volume.solutions], found, rtol=1e-6)
 
@@ -184,13 +196,13 @@ def test_beyond_the_limit_point_pressure_control_keeps_what_it_reached_and_says_
 
 def test_steps_are_cut_where_one_is_too_long() -> None:
     model, bore = _balloon()
-    options = Options(iterations=5)
+    options = replace(SHARP, iterations=5)
     result = follow(model, [Point(2.0)], DisplacementControl((bore,)), options=options)
     assert result.failure is None
     failed = [s for s in result.history if not s.converged]
     assert failed
     assert all(s.reason for s in failed)
-    direct = follow(model, [Point(2.0)], DisplacementControl((bore,)))
+    direct = follow(model, [Point(2.0)], DisplacementControl((bore,)), options=SHARP)
     assert result.solutions[0].pressure == pytest.approx(direct.solutions[0].pressure, rel=1e-6)
 
 
@@ -211,7 +223,7 @@ def test_a_watcher_hears_of_every_step_and_can_stop(tube) -> None:
 
 def test_a_path_continues_from_any_state(tube, inflated) -> None:
     start = inflated.solutions[1].state
-    result = follow(tube.model, [Point(PRESSURES[2])], start=start)
+    result = follow(tube.model, [Point(PRESSURES[2])], start=start, options=SHARP)
     np.testing.assert_allclose(_angles(result)[-1], _angles(inflated)[-1], rtol=1e-7)
 
 
@@ -260,7 +272,7 @@ def test_one_step_can_be_taken_alone(tube) -> None:
         Target(5 * KPA, 1.0, 1.0),
         PressureControl(),
         SuperLU(),
-        Options(mixed_points=False),
+        replace(SHARP, mixed_points=False),
     )
     assert outcome.converged
     assert outcome.state.pressure == 5 * KPA

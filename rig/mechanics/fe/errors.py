@@ -11,3 +11,7 @@ class FiniteElementError(MechanicsError):
 
 class MeshError(FiniteElementError):
     """The mesh does not fit: unknown element, inverted elements, missing boundary, open surface."""
+
+
+class SingularError(FiniteElementError):
+    """The tangent cannot be factorised: something moves without resistance."""

@@ -1,6 +1,7 @@
 """Direct solution of the linear systems, behind one small interface.
 
-pypardiso (MKL) where it is installed; SuperLU of SciPy otherwise, with the ordering for symmetric
+pypardiso (MKL) where it is installed. Otherwise our own multifrontal Cholesky for symmetric
+systems in displacements, and SciPy's SuperLU for the rest, with the ordering for symmetric
 patterns, which is fifteen times faster here than its default.
 """
 
@@ -13,13 +14,10 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from rig.mechanics.fe.errors import FiniteElementError
+from rig.mechanics.fe.errors import SingularError
+from rig.mechanics.fe.frontal import Multifrontal
 
 Array = NDArray[np.float64]
-
-
-class SingularError(FiniteElementError):
-    """The tangent cannot be factorised: something moves without resistance."""
 
 
 class Factor(Protocol):
@@ -96,9 +94,12 @@ class _PardisoFactor:
         return np.asarray(self._solver.solve(self._matrix, right)).reshape(right.shape)
 
 
-def default_solver(symmetric: bool) -> LinearSolver:
-    """PARDISO where pypardiso is installed, SuperLU otherwise."""
+def default_solver(symmetric: bool, continuous_pressure: bool) -> LinearSolver:
+    """PARDISO where pypardiso is installed; otherwise what suits the system best.
+
+    Continuous pressures make it indefinite throughout, which needs pivoting across fronts.
+    """
     try:
         return Pardiso(symmetric)
     except ImportError:
-        return SuperLU()
+        return Multifrontal() if symmetric and not continuous_pressure else SuperLU()

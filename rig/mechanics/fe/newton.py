@@ -15,11 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.mechanics.fe.control import Control, Situation
-from rig.mechanics.fe.linear import LinearSolver, SingularError
+from rig.mechanics.fe.errors import SingularError
+from rig.mechanics.fe.linear import LinearSolver
 from rig.mechanics.fe.model import Assembly, Model
 from rig.mechanics.fe.state import State
 
 Array = NDArray[np.float64]
+_LENIENT = 1e-4
+"""Largest residual that may pass for equilibrium."""
 Clock = Callable[[], float]
 
 
@@ -29,6 +32,9 @@ class Options:
 
     tolerance: float = 1e-7
     """Residual over the size of the element forces that balance in it."""
+    correction: float = 1e-6
+    """A residual up to 1e-4 is good enough as well where the next correction would be below this
+    part of the largest displacement; 0 insists on the residual."""
     iterations: int = 14
     """Iterations before a step counts as failed."""
     mixed_points: bool = True
@@ -120,10 +126,11 @@ def solve_step(
         if not np.isfinite(residual):
             reason = "the material or the geometry broke down (not a number)"
             break
+        needed = _needed(record, residual, state, options)
         arrived = (
-            residual <= options.tolerance
-            and assembly.gap <= 0.3 * options.tolerance**0.5
-            and assembly.volume_error <= options.tolerance
+            residual <= needed
+            and assembly.gap <= 0.3 * needed**0.5
+            and assembly.volume_error <= needed
             and control_error <= 10 * options.tolerance
             and len(record) > 0
         )
@@ -161,6 +168,17 @@ def solve_step(
         assembly_seconds=timer.assembly,
         solve_seconds=timer.solve,
     )
+
+
+def _needed(record: list[Iteration], residual: float, state: State, options: Options) -> float:
+    """The residual to reach: less strict where the next correction would hardly be seen."""
+    if not record or record[-1].residual <= 0 or record[-1].length < 1:
+        return options.tolerance
+    # Newton's corrections shrink at least as the residual does
+    coming = record[-1].correction * residual / record[-1].residual
+    if coming <= options.correction * float(np.abs(state.x).max()):
+        return max(options.tolerance, _LENIENT)
+    return options.tolerance
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,10 @@ Array = NDArray[np.float64]
 
 _EASY = 5
 """Iterations up to which a step was easy enough to try a longer one."""
+_KNOTS = 4
+"""Converged states that a step is extrapolated from."""
+_FAR = 0.4
+"""Strain error of a predicted start beyond which the step is shortened before it is tried."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +136,7 @@ def follow(
         model,
         control or PressureControl(),
         options or Options(),
-        solver or default_solver(model.symmetric),
+        solver or default_solver(model.symmetric, model.discretisation.pressure_nodes > 0),
         clock,
     )
     begin = clock()
@@ -182,15 +186,16 @@ class _Run:
         if not self._past:
             self._past = [(parameter(0.0), self._clean(state))]
         while True:
-            fraction = min(1.0, done + self._step)
-            if 1.0 - fraction < 1e-9:
-                fraction = 1.0
-            target = Target(
-                first.control + fraction * (point.control - first.control),
-                first.dead + fraction * (point.dead - first.dead),
-                first.motion + fraction * (point.motion - first.motion),
+            fraction, target, begin = self._prepare(first, point, parameter, done, mixed)
+            outcome = solve_step(
+                self.model,
+                begin,
+                target,
+                self.control,
+                self.solver,
+                replace(self.options, mixed_points=mixed),
+                self.clock,
             )
-            outcome = self._attempt(target, parameter(fraction), mixed)
             record = StepRecord(
                 point=index,
                 fraction=fraction,
@@ -207,7 +212,7 @@ class _Run:
                 return self._words(outcome, point, fraction, "it was cancelled")
             if outcome.converged:
                 clean = self._clean(outcome.state)
-                self._past = [*self._past[-2:], (parameter(fraction), clean)]
+                self._past = [*self._past[-_KNOTS + 1 :], (parameter(fraction), clean)]
                 if fraction == 1.0:
                     return replace(outcome, state=clean)
                 if record.solves <= _EASY:
@@ -222,19 +227,39 @@ class _Run:
             if self._step < self.options.least_step:
                 return self._words(outcome, point, fraction, outcome.reason)
 
-    def _attempt(self, target: Target, parameter: float, mixed: bool) -> Outcome:
-        options = replace(self.options, mixed_points=mixed)
-        start = self._predicted(target, parameter, mixed)
-        return solve_step(self.model, start, target, self.control, self.solver, options, self.clock)
+    def _prepare(
+        self,
+        first: Target,
+        point: Point,
+        parameter: Callable[[float], float],
+        done: float,
+        mixed: bool,
+    ) -> tuple[float, Target, State]:
+        """How far to go, what must hold there and where to start from."""
+        while True:
+            fraction = min(1.0, done + self._step)
+            if 1.0 - fraction < 1e-9:
+                fraction = 1.0
+            target = Target(
+                first.control + fraction * (point.control - first.control),
+                first.dead + fraction * (point.dead - first.dead),
+                first.motion + fraction * (point.motion - first.motion),
+            )
+            begin, gap = self._predicted(target, parameter(fraction), mixed)
+            if gap <= _FAR or self._step < 4 * self.options.least_step:
+                return fraction, target, begin
+            # the error of the prediction grows with the square of the step or faster
+            self._step = (fraction - done) * max(0.25, 0.8 * (_FAR / gap) ** 0.5)
 
-    def _predicted(self, target: Target, parameter: float, mixed: bool) -> State:
+    def _predicted(self, target: Target, parameter: float, mixed: bool) -> tuple[State, float]:
+        """Where to start from, and by how much its independent strains miss the others."""
         last = self._past[-1][1]
         current = self._with_points(last) if mixed else last
         if not self.options.extrapolate or len(self._past) < 2:
-            return current
+            return current, 0.0
         knots = np.array([p for p, _ in self._past])
         if np.any(np.diff(knots) == 0) or (parameter - knots[-1]) * (knots[-1] - knots[-2]) <= 0:
-            return current
+            return current, 0.0
         weights = _lagrange(knots, parameter)
         states = [s for _, s in self._past]
         x = np.sum([w * s.x for w, s in zip(weights, states, strict=True)], axis=0)
@@ -261,11 +286,11 @@ class _Run:
         guess = self.model.with_bodies_in_place(guess)
         found = self.model.assemble(guess, tangent=False)
         if not np.all(np.isfinite(found.residual)) or found.least_volume_ratio <= 0:
-            return current
+            return current, 0.0
         if not mixed:
-            return guess
+            return guess, 0.0
         own = [self._with_points(s) for s in states]
-        return replace(
+        guess = replace(
             guess,
             points=tuple(
                 PointState(
@@ -276,6 +301,7 @@ class _Run:
                 for i in range(len(points))
             ),
         )
+        return guess, self.model.assemble(guess, tangent=False).gap
 
     def _with_points(self, state: State) -> State:
         return replace(

@@ -1,0 +1,89 @@
+"""The multifrontal solver against SuperLU, on matrices it likes and on those it does not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import sparse
+
+from rig.mechanics.fe import Point, follow
+from rig.mechanics.fe.errors import SingularError
+from rig.mechanics.fe.frontal import Multifrontal
+from rig.mechanics.fe.linear import SuperLU, default_solver
+from tests.mechanics.fe_problems import bending_tube
+
+
+def _shell(nx: int, ny: int, dofs: int, shift: float, seed: int = 0) -> sparse.csc_array:
+    """A symmetric matrix on a grid of nodes with `dofs` unknowns each."""
+    line = [
+        sparse.diags_array([-1.0, 2.0, -1.0], offsets=[-1, 0, 1], shape=(n, n)) for n in (nx, ny)
+    ]
+    grid = sparse.kron(line[0], sparse.eye_array(ny)) + sparse.kron(sparse.eye_array(nx), line[1])
+    mix = np.random.default_rng(seed).standard_normal((dofs, dofs))
+    block = mix @ mix.T + np.eye(dofs)
+    full = sparse.kron(grid, block) + shift * sparse.eye_array(nx * ny * dofs)
+    result = sparse.csc_array(full)
+    result.sort_indices()
+    return result
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    nx=st.integers(1, 40),
+    ny=st.integers(1, 12),
+    dofs=st.integers(1, 3),
+    shift=st.sampled_from([0.0, -0.5, -3.0]),
+)
+def test_solutions_solve_whatever_the_shape_and_the_sign(nx, ny, dofs, shift) -> None:
+    matrix = _shell(nx, ny, dofs, shift + 1e-3)
+    right = np.random.default_rng(1).standard_normal((matrix.shape[0], 2))
+    x = Multifrontal().factorise(matrix).solve(right)
+    error = np.linalg.norm(matrix @ x - right) / np.linalg.norm(right)
+    assert error < 1e-9 * max(1.0, np.abs(x).max())
+
+
+def test_it_tells_whether_the_matrix_is_positive_definite() -> None:
+    assert not Multifrontal().factorise(_shell(30, 10, 3, 0.0)).negative
+    assert Multifrontal().factorise(_shell(30, 10, 3, -3.0)).negative
+
+
+def test_one_analysis_serves_all_matrices_of_a_pattern_and_only_those() -> None:
+    solver = Multifrontal()
+    for matrix in (_shell(30, 8, 3, 0.1), _shell(30, 8, 3, 0.7, seed=5), _shell(12, 20, 2, 0.1)):
+        right = np.arange(matrix.shape[0], dtype=float)
+        expected = SuperLU().factorise(matrix).solve(right)
+        np.testing.assert_allclose(
+            solver.factorise(matrix).solve(right), expected, atol=1e-9 * np.abs(expected).max()
+        )
+
+
+def test_parts_that_do_not_touch_are_solved_side_by_side() -> None:
+    part = _shell(20, 6, 3, 0.1)
+    matrix = sparse.csc_array(sparse.block_diag((part, 2 * part, part)))
+    matrix.sort_indices()
+    right = np.ones(matrix.shape[0])
+    np.testing.assert_allclose(matrix @ Multifrontal().factorise(matrix).solve(right), right)
+
+
+def test_a_singular_matrix_is_named() -> None:
+    for solver in (Multifrontal(), SuperLU()):
+        with pytest.raises(SingularError, match="singular"):
+            solver.factorise(sparse.csc_array(np.zeros((3, 3)) + np.diag([1.0, 0.0, 1.0])))
+
+
+def test_unsymmetric_and_indefinite_systems_go_to_superlu_unless_pardiso_is_there() -> None:
+    names = {default_solver(s, c).name for s, c in ((False, False), (True, True))}
+    assert names in ({"SuperLU"}, {"PARDISO"})
+    assert default_solver(True, False).name in ("multifrontal", "PARDISO")
+
+
+def test_both_solvers_walk_the_same_path() -> None:
+    tube = bending_tube()
+    points = [Point(p) for p in (10e3, 20e3)]
+    a = follow(tube.model, points, solver=Multifrontal())
+    b = follow(tube.model, points, solver=SuperLU())
+    assert a.solves == b.solves
+    for one, other in zip(a.solutions, b.solutions, strict=True):
+        np.testing.assert_allclose(one.state.x, other.state.x, atol=1e-10)
