@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from skfem.quadrature import get_quadrature
-from skfem.refdom import RefLine, RefQuad
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -77,7 +76,7 @@ def _surface(mesh: Any, facets: Indices, order: int) -> tuple[Array, Array]:
     """Places and outward normals times weights at quadrature points, (d, facets, points) each."""
     refdom = mesh.elem.refdom
     dim = refdom.p.shape[0]
-    flat, weights = get_quadrature(RefQuad if dim == 3 else RefLine, order)
+    flat, weights = get_quadrature(refdom.brefdom, order)
     owners = mesh.f2t[0, facets]
     local = np.argmax(mesh.t2f[:, owners] == facets, axis=0)
     place = np.empty((dim, facets.size, weights.size))
@@ -85,16 +84,23 @@ def _surface(mesh: Any, facets: Indices, order: int) -> tuple[Array, Array]:
     for number, corners in enumerate(refdom.facets):
         chosen = np.flatnonzero(local == number)
         corner = refdom.p[:, list(corners)]
-        axis = int(np.flatnonzero(np.ptp(corner, axis=1) == 0)[0])
-        level = corner[axis, 0]
-        points = np.insert(flat, axis, level, axis=0)
-        gradient = _gradient(mesh, owners[chosen], points)
-        # Nanson: n da = det(F) F^-T N dA, and the reference normal is a unit vector
-        row = np.linalg.inv(gradient)[:, :, axis, :] * np.linalg.det(gradient)[..., np.newaxis]
-        outward = 1.0 if level > 0 else -1.0
-        normal[:, chosen] = outward * (row * weights[:, np.newaxis]).transpose(2, 0, 1)
+        # first corner and the edges from it: in scikit-fem corners go round a facet
+        sides = (corner[:, [1, -1]] if dim == 3 else corner[:, [1]]) - corner[:, [0]]
+        across = _crossed(sides.T[np.newaxis])[0]
+        outwards = np.sign(across @ (corner.mean(axis=1) - refdom.p.mean(axis=1)))
+        points = corner[:, [0]] + sides @ flat
+        tangents = np.einsum("eqij,jk->eqki", _gradient(mesh, owners[chosen], points), sides)
+        weighted = outwards * _crossed(tangents) * weights[:, np.newaxis]
+        normal[:, chosen] = np.moveaxis(weighted, -1, 0)
         place[:, chosen] = _places(mesh, owners[chosen], points)
     return place, normal
+
+
+def _crossed(tangents: Array) -> Array:
+    """Normal (..., d) to d - 1 tangents (..., d - 1, d), as long as what they span is large."""
+    if tangents.shape[-1] == 2:
+        return np.stack([tangents[..., 0, 1], -tangents[..., 0, 0]], axis=-1)
+    return np.cross(tangents[..., 0, :], tangents[..., 1, :])
 
 
 def _places(mesh: Any, elements: Indices, points: Array) -> Array:
