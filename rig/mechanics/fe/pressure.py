@@ -4,7 +4,7 @@ All follows from one surface integral of the current area vector n da = (F t1 x 
 reference tangents t1, t2: the force is p n da, the volume V = -1/dim int (x - o) . n da (the
 normal leaves the solid, so it enters the cavity). For a closed cavity, or one whose rim is
 clamped or slides on a plane of symmetry through o, the force is p dV/du and the load stiffness
-p d2V/du2 symmetric (Bufler, Arch. Appl. Mech. 54 (1984) 106; Schweizerhof & Ramm, Comput.
+p d2V/du2 symmetric (Bufler, Z. Angew. Math. Mech. 64 (1984) 287; Schweizerhof & Ramm, Comput.
 Struct. 18 (1984) 1099).
 """
 

@@ -9,8 +9,8 @@ the perturbed Lagrangian W + p (J - 1) - p^2 / (2 K) (Sussman & Bathe, Comput. S
 357). Discontinuous pressures are eliminated element by element, which leaves a symmetric system
 in the displacements; continuous ones stay in the system.
 
-With mixed integration points (Magisano, Leonetti & Garcea, Int. J. Numer. Methods Eng. 112 (2017)
-1213) strain and stress at the quadrature points are independent during the iterations and
+With mixed integration points (Magisano, Leonetti & Garcea, Comput. Methods Appl. Mech. Eng. 313
+(2017) 986) strain and stress at the quadrature points are independent during the iterations and
 eliminated as well: Newton then extrapolates the strain, not the displacement, and bending
 shells cost a fraction of the iterations. Both agree at convergence.
 """
