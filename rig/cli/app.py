@@ -2,10 +2,42 @@
 
 from __future__ import annotations
 
+import sys
+from typing import Any
+
 import typer
+from typer.core import TyperGroup
+
+
+class InterruptionError(Exception):
+    """Somebody pressed Ctrl-C, or closed the input while rig asked for some."""
+
+
+class ClosedPipeError(Exception):
+    """Whoever read the output has left, as `head` does."""
+
+
+class Verbs(TyperGroup):
+    """The group of verbs; leaves Ctrl-C and a closed pipe to `rig.cli.main`.
+
+    Typer would end the process without a word for the first and with status 1 for the second.
+    """
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run a verb; raises InterruptionError and ClosedPipeError."""
+        try:
+            result = super().invoke(ctx)
+            sys.stdout.flush()
+            return result
+        except (KeyboardInterrupt, typer.Abort):
+            raise InterruptionError from None
+        except BrokenPipeError:
+            raise ClosedPipeError from None
+
 
 app = typer.Typer(
     name="rig",
+    cls=Verbs,
     help="Characterise soft pneumatic actuators: predict, measure, compare, report.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,

@@ -5,22 +5,35 @@ Verb modules keep heavy imports inside their functions, so that `rig --help` sta
 
 from __future__ import annotations
 
+import contextlib
 import importlib
+import io
+import os
 import pkgutil
 import sys
 import textwrap
 
 import rig.cli
-from rig.cli.app import app
 from rig.errors import RigError
 
 NOT_VERBS = {"app", "main"}
+INTERRUPTED = 130
+PIPE_CLOSED = 141
 
 
-def _register_verbs() -> None:
+def _run(arguments: list[str]) -> None:
+    """Import the verbs and run one of them; typer is imported here so that Ctrl-C is caught."""
+    from rig.cli.app import ClosedPipeError, InterruptionError, app
+
     for module in pkgutil.iter_modules(rig.cli.__path__):
         if module.name not in NOT_VERBS and not module.name.startswith("_"):
             importlib.import_module(f"rig.cli.{module.name}")
+    try:
+        app(args=arguments, prog_name="rig")
+    except InterruptionError:
+        raise KeyboardInterrupt from None
+    except ClosedPipeError:
+        raise BrokenPipeError from None
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -29,9 +42,12 @@ def main(arguments: list[str] | None = None) -> None:
     debug = "--debug" in arguments
     if debug:
         arguments.remove("--debug")
-    _register_verbs()
+    _print_what_the_terminal_can()
     try:
-        app(args=arguments, prog_name="rig")
+        try:
+            _run(arguments)
+        finally:
+            sys.stdout.flush()  # a reader that left is noticed here, not after the last handler
     except RigError as error:
         if debug:
             raise
@@ -39,9 +55,10 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(error.exit_code)
     except KeyboardInterrupt:
         _complain("Interrupted.")
-        sys.exit(130)
+        sys.exit(INTERRUPTED)
     except BrokenPipeError:
-        sys.exit(141)
+        _discard_output()
+        sys.exit(PIPE_CLOSED)
     except Exception as error:
         if debug:
             raise
@@ -50,6 +67,19 @@ def main(arguments: list[str] | None = None) -> None:
             "Run the same command with --debug and report what it prints."
         )
         sys.exit(70)
+
+
+def _print_what_the_terminal_can() -> None:
+    """Show `?` for characters that the encoding of the terminal lacks, instead of failing."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+
+
+def _discard_output() -> None:
+    """Send the rest of the output nowhere: the interpreter flushes once more as it exits."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _complain(message: str) -> None:
