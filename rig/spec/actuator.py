@@ -10,7 +10,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from rig.spec.base import Count, SpecModel, require
+from rig.spec.base import Count, Name, SpecModel, require
 from rig.spec.quantity import Length, Pressure, Ratio
 
 ModelName = Literal["beam"]
@@ -24,7 +24,7 @@ class BellowBendingGeometry(SpecModel):
 
     family: Literal["bellow-bending"]
     effective_length: Length = Field(0.066, gt=0, description="L, length of all convolutions")
-    bellow_number: Count = Field(6, description="N, convolutions from trough to trough")
+    bellow_number: Count = Field(6, le=1000, description="N, convolutions from trough to trough")
     average_radius: Length = Field(0.006, gt=0, description="rm = (ri + ro) / 2")
     radius_ratio: Ratio = Field(1 / 3, gt=0, lt=1, description="lambda = ri / rm")
     wall_thickness: Length = Field(0.0015, gt=0, description="t, bellow wall")
@@ -71,7 +71,7 @@ class ActuatorSpec(SpecModel):
     """One actuator: what it is, what it is made of, how far it may go, what to predict."""
 
     kind: Literal["actuator"]
-    name: str = Field(min_length=1)
+    name: Name
     description: str = ""
     geometry: Geometry
     material: str = Field(description="name of a file in models/materials, or a path")

@@ -31,4 +31,20 @@ def require(condition: bool, why: str) -> None:
 Number = Annotated[float, Strict()]
 Integer = Annotated[int, Strict()]
 Count = Annotated[int, Strict(), Field(gt=0)]
+Name = Annotated[
+    str,
+    Field(
+        pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,79}$",
+        description="letters, digits, '.', '_' and '-', beginning with a letter or digit",
+    ),
+]
+"""What a thing is called; it becomes part of paths, so it must not be able to leave a folder."""
+Label = Annotated[
+    str,
+    Field(
+        pattern=r"^[A-Za-z0-9][A-Za-z0-9._ -]{0,79}$",
+        description="letters, digits, spaces, '.', '_' and '-', beginning with a letter or digit",
+    ),
+]
+"""As Name, with the spaces of trade names such as Agilus30 DM50."""
 Date = Annotated[date, BeforeValidator(_no_timestamp)]

@@ -5,11 +5,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from rig.spec.base import Count, Integer, Number, SpecModel, require
+from rig.spec.base import Count, Integer, Name, Number, SpecModel, require
 from rig.spec.quantity import (
     Acceleration,
     Angle,
@@ -39,8 +40,8 @@ class SerialBoard(SpecModel):
     """An Arduino Mega on a serial port, or any pyserial URL."""
 
     kind: Literal["serial"]
-    port: str = Field(description="as /dev/ttyACM0, COM3 or socket://host:port")
-    baudrate: Count = 115200
+    port: str = Field(min_length=1, description="as /dev/ttyACM0, COM3 or socket://host:port")
+    baudrate: Count = Field(115200, le=20_000_000)
 
 
 class Syringe(SpecModel):
@@ -54,8 +55,8 @@ class Syringe(SpecModel):
 class Stepper(SpecModel):
     """The motor that turns the lead screw, and how finely it is driven."""
 
-    steps_per_revolution: Count
-    microsteps: Count
+    steps_per_revolution: Count = Field(le=100_000)
+    microsteps: Count = Field(le=1024)
     max_step_rate: Frequency = Field(gt=0)
 
 
@@ -95,7 +96,7 @@ class Transducer(SpecModel):
 class Adc(SpecModel):
     """The converter that reads the transducer."""
 
-    bits: Count = Field(le=32)
+    bits: Count = Field(ge=8, le=16)
     reference: Voltage = Field(gt=0)
 
 
@@ -126,7 +127,7 @@ class Camera(SpecModel):
 
     device: Annotated[VirtualCameraDevice | OpenCvCameraDevice, Field(discriminator="kind")]
     jpeg_quality: Integer = Field(92, ge=50, le=100)
-    frame_rate: Frequency = Field(gt=0)
+    frame_rate: Frequency = Field(ge=0.1, le=1000)
     calibration: str = Field(description="file in calibration/, or a path")
     ruler: str = Field(description="ruler calibration file in calibration/, or a path")
 
@@ -193,10 +194,12 @@ class VirtualOptics(SpecModel):
     """Where the simulated camera stands, and what spoils its picture."""
 
     distance: Length = Field(gt=0, description="camera to the plane of bending")
-    tilt: Angle = Field(ge=0, description="standard deviation of pan, tilt and roll")
-    blur: Number = Field(ge=0, description="standard deviation of the point spread, pixels")
-    noise: Number = Field(ge=0, description="standard deviation, grey levels of 255")
-    light_gradient: Ratio = Field(ge=0, description="brightness change across the picture")
+    tilt: Angle = Field(
+        ge=0, le=math.radians(20), description="standard deviation of pan, tilt and roll"
+    )
+    blur: Number = Field(ge=0, le=20, description="standard deviation of the point spread, pixels")
+    noise: Number = Field(ge=0, le=100, description="standard deviation, grey levels of 255")
+    light_gradient: Ratio = Field(ge=0, le=1, description="brightness change across the picture")
 
 
 class VirtualBench(SpecModel):
@@ -212,7 +215,7 @@ class BenchSpec(SpecModel):
     """One bench: hardware, controller gains, safety limits, and for a virtual one its secrets."""
 
     kind: Literal["bench"]
-    name: str = Field(min_length=1)
+    name: Name
     description: str = ""
     board: Annotated[VirtualBoard | SerialBoard, Field(discriminator="kind")]
     syringe: Syringe

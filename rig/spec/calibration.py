@@ -48,8 +48,8 @@ class CameraCalibration(SpecModel):
 
     kind: Literal["calibration"]
     instrument: Literal["camera"]
-    width: Count
-    height: Count
+    width: Count = Field(le=20_000)
+    height: Count = Field(le=20_000)
     focal_x: Number = Field(gt=0)
     focal_y: Number = Field(gt=0)
     centre_x: Number
@@ -68,7 +68,9 @@ class RulerCalibration(SpecModel):
     kind: Literal["calibration"]
     instrument: Literal["ruler"]
     pitch: Length = Field(gt=0, description="distance between neighbouring marks")
-    marks: Integer = Field(ge=3, description="marks on each leg, the corner mark not counted")
+    marks: Integer = Field(
+        ge=3, le=1000, description="marks on each leg, the corner mark not counted"
+    )
     pitch_u: Length = Field(ge=0, description="standard uncertainty of the pitch")
     squareness_u_deg: Number = Field(ge=0, description="standard uncertainty of the right angle")
     provenance: Provenance

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from rig.spec.base import SpecModel, require
+from rig.spec.base import Label, SpecModel, require
 from rig.spec.hyperelastic import HyperelasticSpec
 from rig.spec.quantity import Density, Modulus, Ratio, Strength
 
@@ -62,7 +62,7 @@ class MaterialSpec(SpecModel):
     """An elastomer as the models need it."""
 
     kind: Literal["material"]
-    name: str = Field(min_length=1)
+    name: Label
     description: str = ""
     young_modulus: SourcedModulus
     poisson_ratio: SourcedPoissonRatio

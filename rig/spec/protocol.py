@@ -6,10 +6,11 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from rig.spec.base import Count, Integer, SpecModel, require
+from rig.spec.base import Count, Integer, Name, SpecModel, require
 from rig.spec.quantity import Duration, Pressure
 
 MAX_STEPS = 1000
+DAY_S = 86_400.0
 
 
 class PressureSteps(SpecModel):
@@ -39,7 +40,16 @@ class Settling(SpecModel):
 
     tolerance: Pressure = Field(50.0, gt=0)
     window: Duration = Field(1.0, gt=0)
-    timeout: Duration = Field(60.0, gt=0)
+    timeout: Duration = Field(60.0, gt=0, le=DAY_S)
+
+    @model_validator(mode="after")
+    def _window_before_timeout(self) -> Settling:
+        require(
+            self.window < self.timeout,
+            f"window is {self.window:g} s, timeout {self.timeout:g} s; expected window below "
+            "timeout, or no pressure ever settles",
+        )
+        return self
 
 
 class SweepProtocol(SpecModel):
@@ -51,8 +61,13 @@ class SweepProtocol(SpecModel):
         0, ge=0, description="how many of the last repeats also come down again (hysteresis)"
     )
     settling: Settling = Settling()
-    hold: Duration = Field(30.0, ge=0, description="wait after settling, against creep")
-    rest: Duration = Field(10.0, ge=0, description="vented rest before each repeat (our choice)")
+    hold: Duration = Field(30.0, ge=0, le=DAY_S, description="wait after settling, against creep")
+    conditioning: Integer = Field(
+        0, ge=0, le=100, description="cycles to the top pressure before the first repeat"
+    )
+    rest: Duration = Field(
+        10.0, ge=0, le=DAY_S, description="vented rest before each repeat (our choice)"
+    )
 
     @model_validator(mode="after")
     def _descending_within_repeats(self) -> SweepProtocol:
@@ -80,7 +95,7 @@ class ProtocolSpec(SpecModel):
     """A protocol file; an experiment that is absent is not run."""
 
     kind: Literal["protocol"]
-    name: str = Field(min_length=1)
+    name: Name
     description: str = ""
     deformation: DeformationProtocol | None = None
     blocked_force: BlockedForceProtocol | None = None

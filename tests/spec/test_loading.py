@@ -96,7 +96,21 @@ def test_a_shipped_spec_survives_json(path: Path) -> None:
          "geometry.family", "did you mean 'bellow-bending'?"),
         (ACTUATOR, "material: agilus30\n", "", "kind", "material", "required, but missing"),
         (ACTUATOR, "name: bellow-bending", "name: [a]", "bellow-bending\n", "name", "a list does"),
-        (BENCH, "bits: 10", "bits: 99", "10  ", "adc.bits", "at most 32"),
+        (BENCH, "bits: 10", "bits: 99", "10  ", "adc.bits", "at least 8 and at most 16"),
+        (BENCH, "bits: 10", "bits: 7", "10  ", "adc.bits", "at least 8 and at most 16"),
+        (BENCH, "blur: 0.8", "blur: 21", "0.8", "virtual.optics.blur", "at most 20"),
+        (BENCH, "noise: 3", "noise: 101", "3\n", "virtual.optics.noise", "at most 100"),
+        (BENCH, "tilt: 1 deg", "tilt: 21 deg", None, "virtual.optics.tilt", "at most 20 deg"),
+        (BENCH, "25 %", "101 %", "25 %", "virtual.optics.light_gradient", "at most 1"),
+        (BENCH, "30 Hz", "0.01 Hz", "30 Hz", "camera.frame_rate", "at least 0.1 Hz"),
+        (BENCH, "{kind: virtual}", "{kind: serial, port: ''}", None, "board.port", "not empty"),
+        (ACTUATOR, ": 6  ", ": 1001  ", "6   ", "geometry.bellow_number", "at most 1000"),
+        (ACTUATOR, ": 6  ", f": {'9' * 400}  ", "6   ", "geometry.bellow_number", "at most 1000"),
+        (PROTOCOL, "repeats: 5", "repeats: 1001", None, "deformation.repeats", "at most 1000"),
+        (PROTOCOL, "hold: 30 s", "hold: 25 h", None, "deformation.hold", "at most 86400 s"),
+        (PROTOCOL, "rest: 10 s", "rest: 25 h", None, "deformation.rest", "at most 86400 s"),
+        (PROTOCOL, "window: 1 s", "window: 60 s", None, "deformation.settling",
+         "window is 60 s, timeout 60 s; expected window below timeout"),
         (BENCH, "0.8\n", ".inf\n", "0.8", "virtual.optics.blur", "expected a number, at least 0"),
         (BENCH, "board: {kind: virtual}", "board: {kind: vrtual}", "virtual}", "board.kind",
          "did you mean 'virtual'? expected one of 'virtual', 'serial'"),
@@ -252,8 +266,25 @@ def test_aliases_that_multiply_are_refused() -> None:
 
 
 def test_escaped_pairs_of_surrogates_are_one_character() -> None:
-    text = SMALL.replace("name: small", 'name: "\\ud83d\\ude42"')
-    assert parse_any(text, Path("file.yaml")).spec.name == "\U0001f642"
+    text = SMALL + 'description: "\\ud83d\\ude42"\n'
+    assert parse_any(text, Path("file.yaml")).spec.description == "\U0001f642"
+
+
+@pytest.mark.parametrize("path", [ACTUATOR, BENCH, PROTOCOL, MATERIAL], ids=lambda p: p.parent.name)
+@pytest.mark.parametrize("name", ["../up", "/etc/x", "a/b", "..", ".hidden", "-flag", "x" * 81, ""])
+def test_a_name_that_could_leave_its_folder_is_refused(path: Path, name: str) -> None:
+    text = re.sub(r"(?m)^name: .*$", f'name: "{name}"', path.read_text(encoding="utf-8"))
+    (problem,) = complaints(text)
+    assert ": name: " in problem
+    assert "beginning with a letter or digit" in problem
+
+
+def test_a_name_may_hold_dots_and_dashes_and_a_material_spaces() -> None:
+    small = SMALL.replace("name: small", "name: Bellow_2.1-b")
+    assert parse_any(small, Path("file.yaml")).spec.name == "Bellow_2.1-b"
+    assert ": name: " in complaints(SMALL.replace("name: small", "name: two words"))[0]
+    material = MATERIAL.with_name("agilus30-dm50.yaml")
+    assert load_material(material).name == "Agilus30 DM50"
 
 
 def test_an_alias_may_repeat_a_value() -> None:
