@@ -17,7 +17,7 @@ from rig.board.revision import firmware_revision
 from rig.board.truth import TruthFile
 from rig.link.bus import SlcanBus
 from rig.mechanics.profile import side_profile
-from rig.plant.camera import VirtualCamera
+from rig.plant.camera import CameraFault, VirtualCamera
 from rig.plant.plant import Fixture, HiddenErrors, Plant, plant_parameters
 from rig.plant.specimen import Specimen, draw_specimen
 from rig.spec.bench import BenchSpec
@@ -89,6 +89,15 @@ def virtual_board(setup: Setup, seed: int) -> NativeBoard:
 
 class PlantCamera:
     """Looks at the plant's actuator, now."""
+
+    @property
+    def fault(self) -> CameraFault:
+        """What is wrong with the camera; may be set at any time."""
+        return self._camera.fault
+
+    @fault.setter
+    def fault(self, fault: CameraFault) -> None:
+        self._camera.fault = fault
 
     def __init__(self, camera: VirtualCamera, plant: Plant, board: NativeBoard) -> None:
         self._camera = camera

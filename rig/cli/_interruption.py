@@ -1,7 +1,9 @@
-"""Ctrl-C during a run: the first asks the experiment to stop safely, the second forces it."""
+"""Ctrl-C during a run asks the experiment to stop safely; only insisting forces it."""
 
 from __future__ import annotations
 
+import contextlib
+import os
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,19 +11,29 @@ from types import FrameType
 
 from rig.experiment.errors import AbortedError
 
+PATIENCE = 3
+"""Signals that are taken as a request; venting a real bench takes some seconds."""
+
 
 class Interruption:
     """Whether somebody asked to stop; ask it with `check` where stopping is safe."""
 
     def __init__(self) -> None:
         self._signal: int | None = None
+        self._count = 0
 
     def note(self, number: int, frame: FrameType | None) -> None:
-        """Handle a signal; raises KeyboardInterrupt when it comes a second time."""
+        """Handle a signal; only impatience beyond PATIENCE raises KeyboardInterrupt."""
         del frame
-        if self._signal is not None:
+        self._signal = self._signal or number
+        self._count += 1
+        if self._count > PATIENCE:
             raise KeyboardInterrupt
-        self._signal = number
+        left = PATIENCE + 1 - self._count
+        hint = f"stopping and venting; {left} more to give up on that"
+        # a handler may run inside any print: write to the descriptor, not to the stream
+        with contextlib.suppress(OSError):
+            os.write(2, f"\nrig: {hint}\n".encode())
 
     @property
     def requested(self) -> bool:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from rig.board.real import RealBench
@@ -27,6 +30,16 @@ from rig.spec.bench import VirtualBoard
 from rig.spec.workspace import Setup, Workspace
 
 
+class _RunConsole(Console):
+    """A console whose reader may go away (`| head`): a run is not stopped by that."""
+
+    def on_broken_pipe(self) -> None:
+        """Fall silent, where rich would end the process."""
+        self.quiet = True
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, sys.stdout.fileno())
+
+
 @dataclass(frozen=True)
 class Session:
     """One characterisation, ready to be shown or run."""
@@ -38,10 +51,11 @@ class Session:
     def show_plan(self) -> None:
         """Print what will be done, in which order, and how long it takes."""
         setup, plan = self.request.setup, self.request.plan
+        names = (setup.actuator.name, setup.material.name, setup.bench.name, setup.protocol.name)
+        actuator, material, bench, protocol = map(escape, names)
         self.console.print(
-            f"[bold]{setup.actuator.name}[/] ({setup.material.name}) on the bench "
-            f"[bold]{setup.bench.name}[/], protocol [bold]{setup.protocol.name}[/], "
-            f"seed {self.request.seed}"
+            f"[bold]{actuator}[/] ({material}) on the bench [bold]{bench}[/], "
+            f"protocol [bold]{protocol}[/], seed {self.request.seed}"
         )
         table = Table("experiment", "sweeps", "points", "pressures (kPa)", "hold (s)")
         for name, label in LABELS.items():
@@ -128,12 +142,17 @@ class Session:
         show_summary(self.console, summary, folder)
         if outcome.error is None:
             return 0
-        ended = outcome.stop.exit_status
+        how_on = (
+            f"`rig resume {folder}` continues after the last complete point."
+            if RunReader(folder).points()
+            else "No point was complete: mend the cause and start a new run."
+        )
         self.console.print(
-            f"The run was {ended}: {outcome.stop.reason} The bench was made safe and the log is "
-            f"closed; `rig resume {folder}` continues after the last complete point.",
+            f"The run was {outcome.stop.exit_status}: {outcome.stop.reason} The log is closed; "
+            f"{how_on}",
             style="bold",
             soft_wrap=True,
+            markup=False,
         )
         return outcome.error.exit_code
 
@@ -169,7 +188,7 @@ def _session(setup: Setup, seed: int, logs: Path) -> Session:
         cavity_volume=float(cavity_volume(setup.actuator.geometry, 0.0)),
         created=None if simulated else datetime.now().astimezone().isoformat(timespec="seconds"),
     )
-    return Session(request, logs, Console())
+    return Session(request, logs, _RunConsole())
 
 
 def truth_path(folder: Path, segment: int) -> Path:

@@ -20,7 +20,7 @@ def replay(
     """Recompute vision, forces, validation and report from the log alone.
 
     Prints how far the recomputed points differ from those taken; an intact log gives the same
-    numbers. Exits 1 if they differ.
+    numbers. Exits 1 if they differ, or if there are none.
 
     Example:
 
@@ -39,6 +39,15 @@ def replay(
         differences = replayed.differences()
     summary = build_report(folder, replayed)
     show_summary(console, summary, folder)
+    if replayed.problem is not None:
+        console.print(
+            f"The log is damaged or unfinished: {replayed.problem}. It holds {len(differences)} "
+            f"complete points.",
+            soft_wrap=True,
+            markup=False,
+        )
+    if not differences:
+        raise typer.Exit(1)
     different = [d for d in differences if d.size > 0]
     if not different:
         console.print(f"All {len(differences)} points are exactly as they were taken.")

@@ -83,6 +83,12 @@ class AngleMeasurement:
             record.image(time_s, jpeg, arrival.key, reading.frame)
             record.angle(reading, time_s)
             readings.append(reading)
+        if not any(r.accepted for r in readings):
+            raise ExperimentError(
+                f"none of {len(readings)} camera frames at {arrival.key.target_kpa:g} kPa can be "
+                f"trusted; the last one: {readings[-1].reason}. They are in the log. Check light, "
+                "focus and view (`rig measure` on a frame tells more), then `rig resume` the run."
+            )
         return angle_point(arrival.visit(from_s, messages), readings)
 
 

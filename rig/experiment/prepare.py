@@ -6,15 +6,21 @@ import math
 
 from rig.experiment.errors import ExperimentError
 from rig.experiment.plan import TRIP_MARGIN
+from rig.experiment.sweep import go_to, settle
 from rig.link.client import RigLink
-from rig.link.errors import LinkError
+from rig.link.errors import CommandRefusedError, LinkError
+from rig.link.faults import HINTS
 from rig.spec.actuator import ActuatorSpec
 from rig.spec.bench import BenchSpec
 from rig.spec.calibration import TransducerCalibration
+from rig.spec.protocol import SweepProtocol
 
 HOMING_TIMEOUT_S = 60.0
 VENT_TIMEOUT_S = 60.0
 FAULT_VENT_S = 30.0
+OFF_HOME_ML_S = 3.0
+OFF_HOME_S = 1.0
+"""A jog ends by itself after half a second; the rest is for the gas to come to rest."""
 ZERO_TIMEOUT_S = 10.0
 TARE_TIMEOUT_S = 30.0
 
@@ -70,15 +76,32 @@ def write_parameters(link: RigLink, wanted: dict[str, float]) -> dict[str, float
     return {name: link.read_parameter(name) for name in link.parameter_names}
 
 
-def make_ready(link: RigLink) -> None:
-    """From any state to idle, homed, vented, and zeroed at ambient pressure.
+def take_over(link: RigLink) -> None:
+    """From any state to one in which parameters may be written: no fault, plunger at rest.
 
-    A latched fault is cleared once: the board refuses if its cause still stands.
+    After a killed run the board has vented by itself and holds a fault; it is cleared once the
+    plunger has come home. Raises CommandRefusedError if the cause of a fault still stands.
     """
     link.raise_faults(False)
-    if link.status is not None and link.status.fault != "none":
-        link.command("clear_fault")
+    end_s = link.now_s + FAULT_VENT_S
+    while link.status is not None and link.status.fault != "none":
+        try:
+            link.command("clear_fault")
+        except CommandRefusedError as error:
+            if link.now_s > end_s:
+                code = link.status.fault
+                raise CommandRefusedError(
+                    f"the board holds the fault '{code}' and does not let it be cleared: "
+                    f"{HINTS.get(code, '')} ({error})"
+                ) from error
+            link.wait(1.0)
+    if link.status is not None and link.status.state not in ("idle", "boot"):
+        vent(link)
     link.raise_faults(True)
+
+
+def make_ready(link: RigLink) -> None:
+    """From idle to homed, vented, and zeroed at ambient pressure."""
     link.command("home")
     link.await_state("idle", HOMING_TIMEOUT_S)
     link.command("zero_pressure")
@@ -91,8 +114,25 @@ def tare(link: RigLink) -> None:
     _await_flag(link, "tared", TARE_TIMEOUT_S, "check the load cell and its HX711")
 
 
+def leave_home(link: RigLink) -> None:
+    """Push the plunger a little off its home switch while the valve is open.
+
+    From home it cannot pull: a pressure slightly above 0 kPa could then not be regulated away.
+    """
+    link.command("jog", OFF_HOME_ML_S)
+    link.wait(OFF_HOME_S)
+
+
+def condition(link: RigLink, top_kpa: float, section: SweepProtocol) -> None:
+    """One cycle to the top pressure and back, against first-cycle effects of the elastomer."""
+    go_to(link, top_kpa)
+    settle(link, top_kpa, section.settling)
+    vent(link)
+
+
 def vent(link: RigLink) -> None:
     """Open the valve, bring the plunger home, and wait until the board is idle."""
+    link.expect_state(None)
     link.command("vent")
     link.await_state("idle", VENT_TIMEOUT_S)
 
@@ -103,6 +143,7 @@ def make_safe(link: RigLink) -> str:
     Used on the way out of a failed run, so it reports instead of raising.
     """
     link.raise_faults(False)
+    link.expect_state(None)
     try:
         if link.status is not None and link.status.state == "fault":
             return _watch_fault_vent(link)

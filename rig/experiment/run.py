@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -16,8 +17,11 @@ from rig.experiment.measure import AngleMeasurement, ForceMeasurement, Measureme
 from rig.experiment.plan import Sweep
 from rig.experiment.prepare import (
     board_parameters,
+    condition,
+    leave_home,
     make_ready,
     make_safe,
+    take_over,
     tare,
     vent,
     write_parameters,
@@ -34,6 +38,7 @@ from rig.record.documents import (
     StartDocument,
     StopDocument,
 )
+from rig.record.errors import RecordError
 from rig.record.writer import RunWriter
 from rig.spec.protocol import BlockedForceProtocol, DeformationProtocol
 from rig.vision.measure import AngleMeter
@@ -90,7 +95,10 @@ def new_run(
     files = {name: text.encode() for name, text in setup.attachments().items()}
     files["rig.dbc"] = load_schema().text.encode()
     context = RunContext(bench, link, request, observer)
-    with RunWriter.create(folder, start, files, units=load_schema().units()) as record:
+    with (
+        _explaining_disk_errors(folder),
+        RunWriter.create(folder, start, files, units=load_schema().units()) as record,
+    ):
         return _recorded(context, record, done=())
 
 
@@ -103,18 +111,39 @@ def resume_run(
     interrupted: Callable[[], None] | None = None,
 ) -> RunOutcome:
     """Do what is left of the plan and append it to the log in `folder`; see `new_run`."""
-    link = RigLink(bench.bus, interrupted=interrupted)
-    link.open()
-    _configure(link, request)
-    context = RunContext(bench, link, request, observer)
-    with RunWriter.resume(folder, units=load_schema().units()) as record:
-        note = ResumeDocument(resumed_s=link.now_s, points_kept=len(done), seed=request.seed)
+    # the log is locked before the bench hears anything: another process may be using both
+    with (
+        _explaining_disk_errors(folder),
+        RunWriter.resume(folder, units=load_schema().units()) as record,
+    ):
+        link = RigLink(bench.bus, interrupted=interrupted)
+        identity = link.open()
+        _configure(link, request)
+        note = ResumeDocument(
+            resumed_s=link.now_s,
+            points_kept=len(done),
+            seed=request.seed,
+            versions=_versions(identity),
+        )
         record.resume_note(note, link.now_s)
-        return _recorded(context, record, done)
+        return _recorded(RunContext(bench, link, request, observer), record, done)
+
+
+@contextmanager
+def _explaining_disk_errors(folder: Path) -> Iterator[None]:
+    """What the disk refuses becomes a RecordError; the bench is safe by then."""
+    try:
+        yield
+    except OSError as error:
+        raise RecordError(
+            f"{folder}: the log cannot be written: {error}. The bench was vented; every complete "
+            f"point is kept. Free space on the disk, then `rig resume {folder}`."
+        ) from error
 
 
 def _configure(link: RigLink, request: RunRequest) -> dict[str, float]:
     setup = request.setup
+    take_over(link)
     wanted = board_parameters(
         setup.bench, setup.actuator, setup.calibrations.transducer, request.cavity_volume
     )
@@ -136,6 +165,7 @@ def _recorded(context: RunContext, record: RunWriter, done: Collection[PointKey]
     recorder = LinkRecorder(record)
     link.set_tap(recorder)
     error: RigError | None = None
+    crash: BaseException | None = None
     try:
         _experiments(context, record, recorder, frozenset(done))
         stop = StopDocument(exit_status="success", reason="all points were measured")
@@ -145,13 +175,28 @@ def _recorded(context: RunContext, record: RunWriter, done: Collection[PointKey]
     except RigError as failure:
         error = failure
         stop = StopDocument(exit_status="failed", reason=str(failure))
-    link.ignore_interruptions()
-    context.observer.stage("making the bench safe")
-    ending = make_safe(link)
-    recorder.flush()
-    record.event(link.now_s, "made safe", {"result": ending})
-    record.stop(stop, link.now_s)
+    except BaseException as unforeseen:  # the bench must be safe before anything else is told
+        crash = unforeseen
+        stop = StopDocument(exit_status="failed", reason=f"{type(crash).__name__}: {crash}")
+    try:
+        ending = _make_safe(context)
+        recorder.flush()
+        record.event(link.now_s, "made safe", {"result": ending})
+        record.stop(stop, link.now_s)
+    finally:
+        if crash is not None:
+            raise crash
     return RunOutcome(stop, error)
+
+
+def _make_safe(context: RunContext) -> str:
+    """Vent, and say how that went; even a person who will not wait leaves a finished log."""
+    context.link.ignore_interruptions()
+    context.observer.stage("making the bench safe")
+    try:
+        return make_safe(context.link)
+    except KeyboardInterrupt:
+        return "Venting was interrupted; the board's own watchdog vents when it hears nothing."
 
 
 def _experiments(
@@ -198,7 +243,11 @@ def _sweep(
     section = context.request.plan.settings(sweep.experiment)
     measure = _measurement(context, sweep.experiment)
     observer.stage(f"resting vented before repeat {sweep.repeat}")
+    if sweep.repeat == 1:
+        for _ in range(section.conditioning):
+            condition(link, section.pressures.stop / 1e3, section)
     link.wait(section.rest)
+    leave_home(link)
     approach(link, left[0], section)
     for key in left:
         observer.point_began(key)
@@ -206,7 +255,8 @@ def _sweep(
         started_s = go_to(link, key.target_kpa)
         settled_s = settle(link, key.target_kpa, section.settling)
         link.wait(section.hold)
-        point = measure(link, record, Arrival(key, started_s, settled_s))
+        arrival = Arrival(key, started_s, settled_s, section.settling.tolerance / 1e3)
+        point = measure(link, record, arrival)
         recorder.flush()
         record.point(point, link.now_s)
         observer.point_done(point)

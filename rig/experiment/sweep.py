@@ -35,9 +35,13 @@ def cell_readings(messages: Sequence[Message], schema: Schema) -> list[CellReadi
 
 
 def go_to(link: RigLink, target_kpa: float) -> float:
-    """Send a set-point; returns the bench time of sending."""
+    """Send a set-point; returns the bench time of sending.
+
+    From then on the link raises if the board stops regulating by itself.
+    """
     started_s = link.now_s
     link.command("set_pressure", target_kpa)
+    link.expect_state("run")
     return started_s
 
 
@@ -87,14 +91,25 @@ class Arrival:
     key: PointKey
     started_s: float
     settled_s: float
+    tolerance_kpa: float
 
     def visit(self, from_s: float, messages: Sequence[Message]) -> Visit:
-        """The visit measured since `from_s` by the messages received since then."""
+        """The visit measured since `from_s` by the messages received since then.
+
+        Raises ExperimentError if the pressure was not the point's while it was measured.
+        """
         pressure = pressures_kpa(messages)
         if len(pressure) == 0:
             raise ExperimentError(
                 f"no pressure telemetry came while measuring at {self.key.target_kpa:g} kPa; "
                 "check the link."
+            )
+        mean_kpa = float(pressure.mean())
+        if abs(mean_kpa - self.key.target_kpa) > self.tolerance_kpa:
+            raise ExperimentError(
+                f"the pressure left {self.key.target_kpa:g} kPa while the point was measured: its "
+                f"mean was {mean_kpa:.3f} kPa, tolerance {self.tolerance_kpa:g} kPa. The point was "
+                "not recorded. Look for a leak or a disturbance, or widen settling.tolerance."
             )
         return Visit(
             self.key, self.started_s, self.settled_s, from_s, messages[-1].time_s, pressure

@@ -19,6 +19,7 @@ from rig.link.errors import (
     IdentityError,
     LinkError,
     LinkLostError,
+    UnexpectedStateError,
 )
 from rig.link.faults import HINTS
 from rig.link.schema import Schema, load_schema
@@ -103,7 +104,9 @@ class RigLink:
         self._tap: Tap | None = None
         self._interrupted = interrupted
         self._alive: dict[int, int] = {}
-        self._number = 0
+        self._command_number = 0
+        self._request_number = 0
+        self._expected_state: str | None = None
         self._last_heartbeat_s = float("-inf")
         self._last_intact_s = bus.now_s
         self._monitor = e2e.AliveMonitor()
@@ -159,6 +162,7 @@ class RigLink:
         self._check_silence()
         if self._raise_faults:
             self._check_fault()
+            self._check_state()
         return messages
 
     def wait(self, duration_s: float) -> list[Message]:
@@ -226,6 +230,24 @@ class RigLink:
             _, value, time_s = self._fault_detail
         raise BoardFaultError(code, value, time_s, HINTS.get(code, ""))
 
+    def expect_state(self, state: str | None) -> None:
+        """From now on `receive` raises UnexpectedStateError when the board is in another state.
+
+        A board that restarts comes back idle and without a fault; this is how it is noticed.
+        """
+        self._expected_state = state
+
+    def _check_state(self) -> None:
+        if self._expected_state is None or self.status is None:
+            return
+        if self.status.state != self._expected_state:
+            raise UnexpectedStateError(
+                f"the board at {self._bus.name} left the state '{self._expected_state}' without "
+                f"being told to: it is in '{self.status.state}', up for {self.status.uptime_s} s"
+                f"{'' if self.status.homed else ' and not homed'}. Did it lose its supply or was "
+                "it reset? Check both, then `rig resume` the run."
+            )
+
     # --- sending ---------------------------------------------------------------------------
 
     def _send(self, message: str, **values: float) -> None:
@@ -241,10 +263,6 @@ class RigLink:
                 self.statistics.host_stall_s = max(self.statistics.host_stall_s, since_s)
             self._last_heartbeat_s = self.now_s
             self._send("HOST_HEARTBEAT", protocol_version=self._schema.protocol_version)
-
-    def _next_number(self) -> int:
-        self._number = self._number % 255 + 1
-        return self._number
 
     def open(self, timeout_s: float = 5.0) -> Identity:
         """Greet the board and check that both ends speak the same schema.
@@ -279,7 +297,7 @@ class RigLink:
         while self.now_s < end_s:
             for message in self.receive(ACKNOWLEDGE_POLL_S):
                 if message.name == "HEARTBEAT" and self._state(message) != "boot":
-                    self._number = int(message.values["command_number"])
+                    self._command_number = int(message.values["command_number"])
                     return
         raise LinkLostError(
             f"the board at {self._bus.name} answered but sends no heartbeat, or does not "
@@ -304,7 +322,8 @@ class RigLink:
         `argument` is in the unit of the command (kPa for set_pressure, mL/s for jog). Raises
         CommandRefusedError with the board's reason, LinkLostError when no answer comes.
         """
-        number = self._next_number()
+        # the board takes the number of its last command for a repetition: count commands apart
+        number = self._command_number = self._command_number % 255 + 1
         values = {"opcode": self._opcodes[opcode], "number": number, "argument": argument}
         end_s = self.now_s + timeout_s
         sent_s = float("-inf")
@@ -389,7 +408,7 @@ class RigLink:
         numbered: bool,
     ) -> dict[str, float | int]:
         """Send a request until its reply comes; return the reply's values."""
-        number = self._next_number()
+        number = self._request_number = self._request_number % 255 + 1
         end_s = self.now_s + timeout_s
         sent_s = float("-inf")
         while self.now_s < end_s:

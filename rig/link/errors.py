@@ -21,6 +21,10 @@ class IdentityError(LinkError):
     """The board speaks another version of the schema, or is no rig board."""
 
 
+class UnexpectedStateError(LinkError):
+    """The board left the state it was told to be in, or restarted."""
+
+
 class CommandRefusedError(LinkError):
     """The board refused a command or a parameter, and said why."""
 

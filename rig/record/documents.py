@@ -91,6 +91,8 @@ class ResumeDocument(Document):
     resumed_s: float
     points_kept: int
     seed: int
+    versions: dict[str, str] = {}
+    """As in the start document, of those who took it up."""
 
 
 class StopDocument(Document):

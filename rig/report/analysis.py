@@ -514,7 +514,8 @@ def _in_words(statement: ValidationStatement) -> str:
     return (
         f"at {statement.beyond} of {statement.levels} pressures the model differs from the "
         f"experiment by more than the expanded validation uncertainty ({k}), by up to "
-        f"{statement.largest_ratio:.3g} times: there the difference is the model's error"
+        f"{statement.largest_ratio:.3g} times: more than the measurement explains. How far "
+        f"modulus and dimensions of the printed part are from the spec is not in that uncertainty"
     )
 
 

@@ -202,6 +202,7 @@ class ResumeSummary(SummaryModel):
     resumed_s: Number
     points_kept: int
     seed: int
+    versions: dict[str, str]
 
 
 class RunSummary(SummaryModel):

@@ -40,3 +40,5 @@ def test_the_default_run_meets_its_targets(seed: int, tmp_path: Path) -> None:
     assert angle.rms < ANGLE_TARGET_DEG
     assert force.rms < FORCE_TARGET_G
     assert worst_kpa < PRESSURE_TARGET_KPA
+    for found in (angle, force):
+        assert abs(found.regulation_kpa).max() < PRESSURE_TARGET_KPA

@@ -14,10 +14,15 @@ import pytest
 from rig.board.virtual import VirtualBench
 from rig.experiment.bench import Nobody
 from rig.experiment.errors import AbortedError
+from rig.experiment.prepare import board_parameters
 from rig.experiment.replay import ReplayedRun
-from rig.link.errors import BoardFaultError
+from rig.link.e2e import protect
+from rig.link.errors import BoardFaultError, UnexpectedStateError
+from rig.link.schema import load_schema
+from rig.plant.camera import CameraFault
 from rig.plant.plant import Faults
 from rig.record.documents import PointDocument
+from rig.record.errors import RecordError
 from rig.record.reader import RunReader
 
 from .conftest import ROOT, VirtualRun, make_request, take, take_rest
@@ -47,6 +52,80 @@ def test_every_point_of_the_plan_is_measured_in_order(short_run: VirtualRun) -> 
         ("blocked_force", 1, "up", 5.0),
         ("blocked_force", 1, "up", 10.0),
     ]
+
+
+def test_every_point_is_held_after_settling(short_run: VirtualRun) -> None:
+    for point in short_run.reader.points():
+        assert point.settled_s is not None
+        assert point.measured_from_s - point.settled_s >= 1.0 + 2.0  # window and hold
+
+
+def test_the_pressure_is_regulated_to_the_set_point(short_run: VirtualRun) -> None:
+    truth = short_run.truth()
+    for experiment in ("deformation", "blocked_force"):
+        off = errors(short_run.reader.points(), truth, experiment).regulation_kpa
+        assert abs(off).max() < PRESSURE_TARGET_KPA
+
+
+def test_the_board_trips_just_above_the_actuators_own_limit() -> None:
+    setup = make_request().setup
+    limits = setup.actuator.limits.model_copy(update={"pressure": 5e3})
+    weak = setup.actuator.model_copy(update={"limits": limits})
+    parameters = board_parameters(setup.bench, weak, setup.calibrations.transducer, 13e-6)
+    assert parameters["pressure_limit_kpa"] == pytest.approx(5.5)
+
+
+def test_the_way_down_lies_above_the_way_up(short_run: VirtualRun) -> None:
+    value = {(p.key.direction, p.key.target_kpa): p.value for p in short_run.reader.points()[:5]}
+    assert value["down", 5.0] is not None
+    assert value["up", 5.0] is not None
+    assert value["down", 5.0] > value["up", 5.0] + 0.1
+
+
+def test_a_board_that_falls_idle_under_a_point_ends_the_run(tmp_path: Path) -> None:
+    class Blinks:
+        """Between the frames of the third point the supply blinks: idle again, and no fault."""
+
+        def __init__(self, bench: VirtualBench) -> None:
+            self._bench, self._camera, self._frames = bench, bench.camera, 0
+
+        def grab(self) -> tuple[float, bytes]:
+            self._frames += 1
+            if self._frames == 5:
+                idle = {"opcode": 9, "number": 200, "argument": 0.0}
+                frame_id, payload = load_schema().encode("COMMAND", idle)
+                self._bench.bus.send(frame_id, protect(frame_id, payload, 14))
+            return self._camera.grab()
+
+    def blink(bench: VirtualBench) -> None:
+        bench.camera = Blinks(bench)  # type: ignore[assignment]
+
+    run = take(tmp_path / "run", make_request(), prepare=blink)
+    assert run.outcome.stop.exit_status == "failed"
+    assert isinstance(run.outcome.error, UnexpectedStateError)
+    assert len(run.reader.points()) == 2
+
+
+def test_a_full_disk_vents_first_and_says_what_to_do(tmp_path: Path) -> None:
+    class Full(Nobody):
+        def point_done(self, point: PointDocument) -> None:
+            raise OSError(28, "No space left on device")
+
+    with pytest.raises(RecordError, match="Free space"):
+        take(tmp_path / "run", make_request(), observer=Full())
+    log = RunReader(tmp_path / "run")
+    assert len(log.points()) == 1
+    assert log.telemetry("HEARTBEAT")["valve_open"][-1] == 1
+
+
+def test_a_dark_picture_ends_the_run_instead_of_a_point_without_a_value(tmp_path: Path) -> None:
+    def darken(bench: VirtualBench) -> None:
+        bench.camera.fault = CameraFault.DARK
+
+    run = take(tmp_path / "run", make_request(), prepare=darken)
+    assert run.outcome.stop.exit_status == "failed"
+    assert "camera frames" in run.outcome.stop.reason
+    assert run.reader.points() == ()
 
 
 def test_what_is_measured_is_what_is_so(short_run: VirtualRun) -> None:

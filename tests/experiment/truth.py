@@ -19,6 +19,8 @@ class Errors:
     pressure_kpa: NDArray[np.float64]
     value: NDArray[np.float64]
     u: NDArray[np.float64]
+    regulation_kpa: NDArray[np.float64]
+    """True pressure minus set-point."""
 
     @property
     def rms(self) -> float:
@@ -45,7 +47,8 @@ def errors(
                 point.pressure_kpa - true_pressure[inside].mean(),
                 point.value - true_value[inside].mean(),
                 point.value_u,
+                true_pressure[inside].mean() - point.key.target_kpa,
             )
         )
     table = np.array(rows)
-    return Errors(table[:, 0], table[:, 1], table[:, 2])
+    return Errors(table[:, 0], table[:, 1], table[:, 2], table[:, 3])

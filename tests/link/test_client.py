@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 
 import pytest
@@ -13,6 +14,7 @@ from rig.link.errors import (
     CommandRefusedError,
     IdentityError,
     LinkLostError,
+    UnexpectedStateError,
 )
 from rig.link.faults import HINTS
 from rig.link.schema import load_schema
@@ -142,6 +144,36 @@ def test_a_lost_command_is_sent_again_under_the_same_number(
     assert len(numbers) == 3
     assert len(set(numbers)) == 1
     assert link.statistics.resent_commands == 2
+
+
+def test_a_board_that_leaves_its_state_by_itself_is_noticed(
+    board: ScriptedBoard, link: RigLink
+) -> None:
+    board.state = 4
+    link.command("set_pressure", 5.0)
+    link.expect_state("run")
+    link.wait(1.0)
+    board.state = 1  # it was reset: idle, and no fault
+    with pytest.raises(UnexpectedStateError, match="reset"):
+        link.wait(1.0)
+
+
+def test_requests_never_use_up_the_numbers_of_commands(board: ScriptedBoard, link: RigLink) -> None:
+    link.command("vent")
+    for _ in range(255):
+        link.read_parameter("deadband_kpa")
+    link.command("vent")
+    numbers = [values["number"] for values in commands(board)]
+    assert len(set(numbers)) == 2
+
+
+def test_command_numbers_wrap_past_zero(board: ScriptedBoard, link: RigLink) -> None:
+    for _ in range(300):
+        link.command("vent")
+    numbers = [values["number"] for values in commands(board)]
+    assert min(numbers) == 1
+    assert max(numbers) == 255
+    assert all(a != b for a, b in itertools.pairwise(numbers))
 
 
 def test_commands_continue_the_boards_numbering(board: ScriptedBoard, link: RigLink) -> None:

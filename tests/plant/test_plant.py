@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rig.plant.plant import Faults, Fixture, Plant
+from rig.plant.plant import Faults, Fixture, HiddenErrors, Plant, plant_parameters
+from rig.plant.specimen import draw_specimen
+from rig.spec.workspace import Workspace
 
 AMBIENT = 101_325.0
 TEMPERATURE = 295.15
@@ -274,3 +277,34 @@ def test_transducer_noise_has_the_stated_deviation() -> None:
     plant = make(transducer_noise=0.02)
     volts = np.array([plant.run(1).adc[i] for _ in range(4_000) for i in (0, 4, 8)]) * 5 / 1024
     assert volts.std() == pytest.approx(0.02, rel=0.03)
+
+
+def test_the_plant_has_every_imperfection_that_the_bench_states() -> None:
+    library = Workspace(Path(__file__).resolve().parents[2])
+    setup = library.setup("bellow-bending")
+    bench, virtual = setup.bench, setup.bench.virtual
+    assert virtual is not None
+    rng = np.random.default_rng(1)
+    specimen = draw_specimen(setup.actuator, setup.material, virtual.specimen, rng)
+    calibrations = setup.calibrations
+    hidden = HiddenErrors.draw(bench, calibrations.transducer, calibrations.load_cell, rng)
+    found = plant_parameters(
+        bench, calibrations.transducer, calibrations.load_cell, specimen, hidden, 12e3
+    )
+    area = np.pi * bench.syringe.inner_diameter**2 / 4
+    assert found["backlash_volume"] == pytest.approx(area * bench.lead_screw.backlash)
+    assert found["play_share"] == specimen.hysteresis == virtual.specimen.hysteresis > 0
+    assert found["creep_share"] == specimen.creep_share == virtual.specimen.creep > 0
+    assert found["creep_time"] == virtual.specimen.creep_time
+    assert found["heat_exchange_time"] == virtual.pneumatics.heat_exchange_time
+    assert found["leak_conductance"] * 10e3 == pytest.approx(virtual.pneumatics.leak)
+    words = bench.load_cell.sample_rate * virtual.sensors.bad_word_interval
+    assert found["bad_word_probability"] == pytest.approx(1 / words)
+    assert found["transducer_gain"] == pytest.approx(
+        calibrations.transducer.gain * (1 + hidden.transducer_gain)
+    )
+    grams = found["counts_per_newton"] * 9.80665e-3 / (1 + hidden.counts_per_gram)
+    assert grams == pytest.approx(calibrations.load_cell.counts_per_gram)
+    noise_newton = found["load_cell_noise_counts"] / found["counts_per_newton"]
+    assert noise_newton == pytest.approx(virtual.sensors.load_cell_noise * 9.80665)
+    assert min(abs(hidden.transducer_gain), abs(hidden.transducer_offset)) > 0
