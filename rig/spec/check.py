@@ -62,6 +62,10 @@ def check_file(path: Path) -> FileReport:
             workspace.resolve_bench_file(source)
     except SpecError as error:
         return FileReport(path, kind, error.problems)
+    except Exception as error:  # a defect must not hide what is wrong with the other files
+        why = f"{type(error).__name__}: {error}"
+        message = f"could not be checked; this is a defect in rig, please report it: {why}"
+        return FileReport(path, kind, (Problem(path, message),))
     return FileReport(path, kind, ())
 
 

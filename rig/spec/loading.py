@@ -22,7 +22,7 @@ from rig.spec.explain import did_you_mean, one_of, problems_of
 from rig.spec.material import MaterialSpec
 from rig.spec.protocol import ProtocolSpec
 from rig.spec.published import PublishedReference
-from rig.spec.tree import Tree, parse_tree
+from rig.spec.tree import MAX_CHARACTERS, Tree, parse_tree
 
 AnyCalibration = TransducerCalibration | LoadCellCalibration | CameraCalibration | RulerCalibration
 AnySpec = (
@@ -45,6 +45,9 @@ INSTRUMENTS: dict[str, type[AnyCalibration]] = {
     "ruler": RulerCalibration,
 }
 """Model of each calibrated `instrument`."""
+
+MAX_BYTES = 4 * MAX_CHARACTERS
+"""The most that UTF-8 takes for the longest text that is parsed."""
 
 S_co = TypeVar("S_co", bound=BaseModel, covariant=True)
 S = TypeVar("S", bound=BaseModel)
@@ -134,7 +137,13 @@ def parse_calibration(text: str, path: Path) -> Loaded[AnyCalibration]:
 def read_text(path: Path) -> str:
     """Text of `path`; raises SpecError if there is none to read."""
     try:
-        return path.read_bytes().decode("utf-8-sig")
+        if path.exists() and not (path.is_file() or path.is_dir()):  # would block or never end
+            raise SpecError([Problem(path, "is a device or a pipe; expected a YAML file")])
+        with path.open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
+        if len(data) > MAX_BYTES:
+            raise SpecError([Problem(path, f"larger than {MAX_BYTES} bytes: no spec")])
+        return data.decode("utf-8-sig")
     except FileNotFoundError:
         problem = "no such file"
     except IsADirectoryError:

@@ -70,6 +70,8 @@ def _split(text: str) -> tuple[float, str]:
     """Number and pint unit of `text`; the unit is empty for a bare number."""
     if len(text) > MAX_CHARACTERS:
         raise ValueError(f"'{text[:20]}...' is too long for a number with a unit")
+    if re.match(r"[+-]?\d*,\d", text.strip()):
+        raise ValueError(f"'{text.strip()}' has a comma; write a decimal point, as in 66.5")
     match = _QUANTITY.fullmatch(text.strip())
     if match is None:
         if re.match(r"[+-]?\.?(nan|inf)", text.strip(), re.IGNORECASE):

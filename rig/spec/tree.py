@@ -156,7 +156,11 @@ class _Builder:
         result: dict[str, Any] = {}
         first_lines: dict[str, int] = {}
         for key_node, value_node in node.value:
-            if not isinstance(key_node, ScalarNode) or key_node.tag == _tag("merge"):
+            if key_node.tag == _tag("merge"):
+                message = "merge keys are not used in specs; write the keys out"
+                self.complain(key_node, location, message)
+                continue
+            if not isinstance(key_node, ScalarNode):
                 self.complain(key_node, location, "expected plain text as key")
                 continue
             try:

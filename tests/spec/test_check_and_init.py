@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from rig.cli.main import main
+from rig.spec.loading import parse_any
 
 ROOT = Path(__file__).resolve().parents[2]
 ACTUATOR = ROOT / "models/actuators/bellow-bending.yaml"
@@ -161,3 +162,22 @@ def test_init_can_write_the_schemas_alone(rig, tmp_path: Path) -> None:  # type:
     assert written == sorted(path.name for path in (ROOT / "models/schemas").iterdir())
     assert len(out.splitlines()) == len(written)
     assert list(tmp_path.iterdir()) == [tmp_path / "schemas"]
+
+
+def test_a_defect_met_in_one_file_leaves_the_others_checked(
+    rig, broken: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:  # type: ignore[no-untyped-def]
+    good = tmp_path / "good.yaml"
+    good.write_text(ACTUATOR.read_text(encoding="utf-8"), encoding="utf-8")
+
+    def parse(text: str, path: Path) -> object:
+        if path == broken:
+            raise ZeroDivisionError("by accident")
+        return parse_any(text, path)
+
+    monkeypatch.setattr("rig.spec.check.parse_any", parse)
+    code, out, _ = rig("check", broken, good)
+    assert code == 1
+    assert f"{broken}: could not be checked" in out
+    assert "ZeroDivisionError: by accident" in out
+    assert f"OK {good} (actuator)" in out

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -81,6 +82,8 @@ def test_a_shipped_spec_survives_json(path: Path) -> None:
     ("path", "old", "new", "at", "field", "message"),
     [
         (ACTUATOR, "66 mm", "66 kPa", "66 mm", "geometry.effective_length", "is a pressure, not a"),
+        (ACTUATOR, "66 mm", "66,5 mm", "66 mm", "geometry.effective_length",
+         "'66,5 mm' has a comma; write a decimal point"),
         (ACTUATOR, "66 mm", ".nan", "66 mm", "geometry.effective_length", "not a finite number"),
         (ACTUATOR, "66 mm", "-1", "66 mm", "geometry.effective_length", "'-1' is out of range"),
         (ACTUATOR, "66 mm ", "yes ", "66 mm", "geometry.effective_length", "is not a number with"),
@@ -244,6 +247,8 @@ def test_a_protocol_without_experiments_is_refused() -> None:
         ("a: " + "9" * 5000, f"file.yaml:1:4: a: '{'9' * 40}' is not a valid int"),
         ('a: "\\ud800"\n', "file.yaml:1:4: a: half a character"),
         ('"\\udc00": 1\n', "file.yaml:1:1: half a character"),
+        ("a: &x {b: 1}\nc:\n  <<: *x\n", "file.yaml:3:3: c: merge keys are not used in specs; "
+         "write the keys out"),
         ("? [1, 2]\n: 3\n", "file.yaml:1:3: expected plain text as key"),
     ],
 )  # fmt: skip
@@ -304,6 +309,30 @@ def test_a_missing_file_a_directory_and_binary_are_told_in_the_same_style(tmp_pa
         with pytest.raises(SpecError) as caught:
             load(path)
         assert str(caught.value) == expected
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_pipe_is_refused_without_waiting_for_it(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe.yaml"
+    os.mkfifo(pipe)
+    with pytest.raises(SpecError, match="is a device or a pipe; expected a YAML file"):
+        load(pipe)
+
+
+def test_a_device_without_end_is_refused() -> None:
+    endless = Path("/dev/zero")
+    if not endless.exists():
+        pytest.skip("needs /dev/zero")
+    with pytest.raises(SpecError, match="is a device or a pipe"):
+        load(endless)
+
+
+def test_of_a_huge_file_only_the_limit_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "huge.yaml"
+    with path.open("wb") as file:
+        file.truncate(50_000_000_000)  # sparse
+    with pytest.raises(SpecError, match="larger than 4000000 bytes: no spec"):
+        load(path)
 
 
 def test_a_byte_order_mark_and_windows_line_ends_do_no_harm(tmp_path: Path) -> None:
