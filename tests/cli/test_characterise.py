@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from rig.errors import RigError
 from rig.record.reader import RunReader
 
 from .conftest import ROOT, Command
@@ -116,8 +117,8 @@ def test_ctrl_c_vents_closes_the_log_and_says_how_to_go_on(tmp_path: Path) -> No
         env={**os.environ, "COLUMNS": "200"},
     )
     deadline = time.monotonic() + 60
-    while time.monotonic() < deadline and not _has_points(folder):
-        time.sleep(0.2)
+    while time.monotonic() < deadline and _points(folder) < 1:
+        time.sleep(0.1)
     process.send_signal(signal.SIGINT)
     said, _ = process.communicate(timeout=60)
     assert process.returncode == 130
@@ -125,10 +126,83 @@ def test_ctrl_c_vents_closes_the_log_and_says_how_to_go_on(tmp_path: Path) -> No
     assert f"rig resume {folder}" in said.replace("\n", " ")
     reader = RunReader(folder)
     assert reader.complete
+    assert len(reader.points()) >= 1
     assert reader.telemetry("HEARTBEAT")["valve_open"][-1] == 1
     assert json.loads((folder / "summary.json").read_text())["status"] == "aborted"
 
 
-def _has_points(folder: Path) -> bool:
-    log = folder / "run.mcap"
-    return log.exists() and log.stat().st_size > 2_000_000
+SWEEPS = """
+kind: protocol
+name: sweeps
+deformation:
+  pressures: {start: 0 kPa, stop: 10 kPa, step: 5 kPa}
+  repeats: 12
+  hold: 2 s
+  rest: 1 s
+  frames: 2
+"""
+
+
+def test_a_killed_run_is_completed_by_resume_and_the_report_says_so(
+    rig: Command, tmp_path: Path
+) -> None:
+    protocol, folder = tmp_path / "sweeps.yaml", tmp_path / "run"
+    protocol.write_text(SWEEPS)
+    command = [sys.executable, "-m", "rig", "characterise", "--actuator", ACTUATOR]
+    process = subprocess.Popen(
+        [*command, "--protocol", str(protocol), "--out", str(folder)],
+        cwd=ROOT,
+        stdout=subprocess.DEVNULL,
+    )
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline and _points(folder) < 2:
+        time.sleep(0.05)
+    process.kill()
+    process.wait()
+    killed = RunReader(folder)
+    assert not killed.complete
+    kept = killed.points()
+    assert 2 <= len(kept) < 36
+
+    assert rig("report", folder).code == 0
+    assert json.loads((folder / "summary.json").read_text())["status"] == "failed"
+
+    assert rig("resume", folder).code == 0
+    resumed = RunReader(folder)
+    assert resumed.complete
+    assert len(resumed.points()) == 36
+    assert resumed.points()[: len(kept)] == kept
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["status"] == "success"
+    assert [r["points_kept"] for r in summary["resumed"]] == [len(kept)]
+    assert f"after {len(kept)} points" in (folder / "report.html").read_text()
+
+
+def _points(folder: Path) -> int:
+    try:
+        return len(RunReader(folder).points())
+    except RigError:
+        return 0
+
+
+def test_insisting_on_ctrl_c_still_vents(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "rig", "characterise", "--actuator", ACTUATOR, "--out", str(folder)],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline and _points(folder) < 1:
+        time.sleep(0.1)
+    for _ in range(2):
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.02)
+    said, _ = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "venting" in said
+    reader = RunReader(folder)
+    assert reader.complete
+    assert reader.telemetry("HEARTBEAT")["valve_open"][-1] == 1
