@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from rig.vision.segment import Image, as_image
 
 IMAGE_SUFFIXES = {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp"}
 VIDEO_SUFFIXES = {".mp4", ".avi", ".mov", ".mkv", ".m4v", ".webm", ".mpg", ".mpeg", ".wmv"}
+FFMPEG_LOG_LEVEL = "OPENCV_FFMPEG_LOGLEVEL"
 GLOB_CHARACTERS = re.compile(r"[*?\[]")
 
 
@@ -36,6 +38,10 @@ def expand(arguments: Sequence[str]) -> list[Path]:
     """
     files: list[Path] = []
     for argument in arguments:
+        if not argument.strip():
+            raise VisionError(
+                f"An empty name was given. {_EXPECTED} Perhaps a variable of the shell is not set."
+            )
         path = Path(argument).expanduser()
         if path.is_dir():
             known = IMAGE_SUFFIXES | VIDEO_SUFFIXES
@@ -44,19 +50,22 @@ def expand(arguments: Sequence[str]) -> list[Path]:
         elif path.exists():
             found, what = [path], ""
         elif GLOB_CHARACTERS.search(argument):
-            anchor = Path(path.anchor) if path.is_absolute() else Path()
-            pattern = str(path.relative_to(path.anchor)) if path.is_absolute() else str(path)
-            found = [p for p in anchor.glob(pattern) if p.is_file()]
-            what = "matches no file"
+            found, what = _matches(path), "matches no file"
         else:
             found, what = [], "does not exist"
         if not found:
-            raise VisionError(
-                f"'{argument}' {what}. Give images ({_list(IMAGE_SUFFIXES)}), videos "
-                f"({_list(VIDEO_SUFFIXES)}), folders of them, or a glob such as 'frames/*.png'."
-            )
+            raise VisionError(f"'{argument}' {what}. {_EXPECTED}")
         files += sorted(found, key=_natural)
     return list(dict.fromkeys(files))
+
+
+def _matches(pattern: Path) -> list[Path]:
+    anchor = Path(pattern.anchor)
+    relative = str(pattern.relative_to(pattern.anchor))
+    try:
+        return [path for path in anchor.glob(relative) if path.is_file()]
+    except (ValueError, NotImplementedError, re.error) as error:
+        raise VisionError(f"'{pattern}' is no valid glob: {error}. {_EXPECTED}") from None
 
 
 def read_frames(path: Path) -> Iterator[Frame]:
@@ -64,11 +73,15 @@ def read_frames(path: Path) -> Iterator[Frame]:
 
     Raises VisionError where the file cannot be read, is neither, is cut short, or has no frame.
     """
+    _silence_decoders()
     try:
+        if path.exists() and not path.is_file():  # a pipe would block, a device never end
+            raise VisionError(f"{path} is no regular file; expected an image or a video.")
         with path.open("rb") as file:
             head = file.read(2048)
-    except OSError as error:
-        raise VisionError(f"{path} cannot be read: {error.strerror}.") from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise VisionError(f"{path} cannot be read: {reason}.") from None
     if not head:
         raise VisionError(f"{path} is empty: it was never written, or copied incompletely.")
     if path.suffix.lower() not in VIDEO_SUFFIXES and cv2.haveImageReader(str(path)):
@@ -79,11 +92,20 @@ def read_frames(path: Path) -> Iterator[Frame]:
         yield from _video(path)
 
 
+def _silence_decoders() -> None:
+    """Decoders would write of every damaged file to stderr; the errors raised here say it all."""
+    os.environ.setdefault(FFMPEG_LOG_LEVEL, "-8")
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+
+
 def _still(path: Path) -> Image:
     data = path.read_bytes()
     if _is_cut(data):
         raise VisionError(f"{path} is cut short: its end is missing; copy it again.")
-    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    try:
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    except (cv2.error, MemoryError) as error:  # such as a header that claims 100000 x 100000
+        raise VisionError(f"{path} cannot be decoded: {_words(error)}.") from None
     if image is None:
         raise VisionError(f"{path} is damaged: it starts like an image but cannot be decoded.")
     return as_image(image)
@@ -113,7 +135,12 @@ def _video(path: Path) -> Iterator[Frame]:
             )
         index = 0
         while True:
-            ok, image = capture.read()
+            try:
+                ok, image = capture.read()
+            except (cv2.error, MemoryError) as error:
+                raise VisionError(
+                    f"{path} cannot be decoded from frame {index} on: {_words(error)}."
+                ) from None
             if not ok or image is None:
                 break
             yield Frame(path, index, capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3, as_image(image))
@@ -124,6 +151,12 @@ def _video(path: Path) -> Iterator[Frame]:
         capture.release()
 
 
+def _words(error: Exception) -> str:
+    """What OpenCV says, without its version and source lines."""
+    what = getattr(error, "err", "") or str(error) or "not enough memory"
+    return " ".join(what.split()).rstrip(".")
+
+
 def _natural(path: Path) -> list[tuple[int, int, str]]:
     """Sort key in which frame_9 comes before frame_10."""
     pieces = re.split(r"(\d+)", str(path))
@@ -132,3 +165,9 @@ def _natural(path: Path) -> list[tuple[int, int, str]]:
 
 def _list(suffixes: set[str]) -> str:
     return ", ".join(sorted(suffix.lstrip(".") for suffix in suffixes))
+
+
+_EXPECTED = (
+    f"Give images ({_list(IMAGE_SUFFIXES)}), videos ({_list(VIDEO_SUFFIXES)}), folders of them, "
+    "or a glob such as 'frames/*.png'."
+)
