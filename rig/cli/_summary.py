@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from rig.report.summary import RunSummary
@@ -17,15 +18,16 @@ def show_summary(console: Console, summary: RunSummary, folder: Path) -> None:
         points = f"{experiment.measured} of {experiment.planned}"
         unit = experiment.unit
         if not experiment.models:
-            table.add_row(name, points, "-", "-", "-", "-")
+            table.add_row(escape(name), points, "-", "-", "-", "-")
         for model, result in experiment.models.items():
             table.add_row(
-                name,
+                escape(name),
                 points,
-                model,
+                escape(model),
                 f"{result.rmse.value:.3g} ± {result.rmse.u95:.2g} {unit}",
                 f"{result.bias.value:+.3g} {unit}",
                 f"{result.max_error.value:.3g} {unit} at {result.max_error.pressure_kpa:g} kPa",
             )
     console.print(table)
-    console.print(f"status: {summary.status}; report: {folder / 'report.html'}", soft_wrap=True)
+    outcome = f"status: {summary.status}; report: {folder / 'report.html'}"
+    console.print(escape(outcome), soft_wrap=True)

@@ -31,6 +31,7 @@ def compare(
     Example: `rig compare logs/first logs/second --out comparison.html`
     """
     from rich.console import Console
+    from rich.markup import escape
 
     from rig.report.compare import read_runs, write_comparison
 
@@ -49,15 +50,16 @@ def compare(
                 else f"differs at {agreement.beyond} of {agreement.levels} pressures from"
             )
             console.print(
-                f"{agreement.run} {verdict} {named[0].name}; the largest difference for its "
-                f"uncertainty is {agreement.difference:+.3g} {experiment.unit} at "
-                f"{agreement.pressure_kpa:g} kPa (En {agreement.en:+.2g}).",
+                f"{escape(agreement.run)} {verdict} {escape(named[0].name)}; "
+                f"the largest difference for its uncertainty is {agreement.difference:+.3g} "
+                f"{experiment.unit} at {agreement.pressure_kpa:g} kPa (En {agreement.en:+.2g}).",
                 soft_wrap=True,
             )
-    console.print(f"comparison: {out}", soft_wrap=True)
+    console.print(f"comparison: {escape(str(out))}", soft_wrap=True)
 
 
 def _table(experiment: ComparedExperiment) -> Table:
+    from rich.markup import escape
     from rich.table import Table
 
     table = Table(
@@ -65,15 +67,22 @@ def _table(experiment: ComparedExperiment) -> Table:
         "status",
         "points",
         f"highest pressure ({experiment.unit})",
-        *(f"RMSE, {model} ({experiment.unit})" for model in experiment.models),
+        *(f"RMSE, {escape(model)} ({experiment.unit})" for model in experiment.models),
         f"repeatability ({experiment.unit})",
         f"hysteresis ({experiment.unit})",
-        title=experiment.title,
+        title=escape(experiment.title),
     )
     for row in experiment.rows:
-        table.add_row(
-            row.run, row.status, row.points, row.top, *row.errors, row.repeatability, row.hysteresis
+        cells = (
+            row.run,
+            row.status,
+            row.points,
+            row.top,
+            *row.errors,
+            row.repeatability,
+            row.hysteresis,
         )
+        table.add_row(*(escape(cell) for cell in cells))
     return table
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -129,3 +130,29 @@ def test_verbs_refuse_what_is_no_run_in_one_paragraph(
     printed = " ".join(capsys.readouterr().err.split())  # the paragraph may wrap anywhere
     assert "no readable run" in printed
     assert "Traceback" not in printed
+
+
+def test_square_brackets_in_names_are_printed_as_they_are(
+    run_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    strange = tmp_path / "[bold]run"
+    shutil.copytree(run_folder, strange)
+    page = tmp_path / "[red].html"
+    with pytest.raises(SystemExit) as stopped:
+        main(["compare", str(strange), str(run_folder), "--out", str(page)])
+    assert not stopped.value.code
+    said = capsys.readouterr().out
+    assert f"comparison: {page}" in said
+    assert "agrees with [bold]run;" in said
+
+
+def test_the_outcome_of_a_run_in_a_folder_with_brackets_is_printed_as_it_is(
+    run_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from rich.console import Console
+
+    from rig.cli._summary import show_summary
+
+    (run,) = read_runs([run_folder, run_folder])[:1]
+    show_summary(Console(width=200), run.summary, Path("[") / "b]run")
+    assert "report: [/b]run/report.html" in capsys.readouterr().out
