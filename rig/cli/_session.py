@@ -120,6 +120,7 @@ class Session:
                 segment=segment,
                 start_s=start_s,
             )
+        _require_measured_calibrations(setup)
         return RealBench(setup.bench, setup.calibrations.camera, self._ask, start_s=start_s)
 
     def _ask(self, instruction: str) -> None:
@@ -189,6 +190,19 @@ def _session(setup: Setup, seed: int, logs: Path) -> Session:
         created=None if simulated else datetime.now().astimezone().isoformat(timespec="seconds"),
     )
     return Session(request, logs, _RunConsole())
+
+
+def _require_measured_calibrations(setup: Setup) -> None:
+    """Refuse a real bench with the calibrations of the virtual one: its figures would be false."""
+    named = vars(setup.calibrations).items()
+    simulated = [role.replace("_", " ") for role, c in named if c.provenance.simulated]
+    if simulated:
+        raise ExperimentError(
+            f"the bench '{setup.bench.name}' is a real one, but its calibrations of "
+            f"{', '.join(simulated)} define the virtual bench (provenance.simulated). Nothing was "
+            "moved. Calibrate these instruments, write what you found into files of their own in "
+            "calibration/, and name those in the bench."
+        )
 
 
 def truth_path(folder: Path, segment: int) -> Path:

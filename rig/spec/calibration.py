@@ -17,6 +17,9 @@ class Provenance(SpecModel):
     method: str
     instrument: str
     operator: str = ""
+    simulated: bool = Field(
+        False, strict=True, description="defines a virtual bench; never valid on a real one"
+    )
 
 
 class TransducerCalibration(SpecModel):

@@ -61,10 +61,24 @@ def test_a_pressure_above_the_limit_moves_nothing(rig: Command, tmp_path: Path) 
     assert not out.exists()
 
 
+def test_a_real_bench_is_not_run_on_the_virtual_ones_calibrations(
+    rig: Command, tmp_path: Path
+) -> None:
+    actuator = ROOT / "models/actuators/bellow-bending.yaml"
+    out = tmp_path / "run"
+    outcome = rig("characterise", "--actuator", actuator, "--bench", "mega", "--out", out)
+    assert_explained(outcome, "transducer", "camera", "Calibrate", "Nothing was moved")
+    assert not out.exists()
+
+
 def test_a_port_that_is_not_there_is_named(rig: Command, tmp_path: Path) -> None:
+    for source in (ROOT / "calibration").glob("*-virtual.yaml"):
+        measured = source.read_text().replace("simulated: true", "simulated: false")
+        (tmp_path / source.name).write_text(measured)
     text = (ROOT / "models/benches/mega.yaml").read_text()
     bench = tmp_path / "bench.yaml"
-    bench.write_text(re.sub(r"port: [^,}\s]+", "port: /dev/no-such-port", text))
+    text = re.sub(r"port: [^,}\s]+", "port: /dev/no-such-port", text)
+    bench.write_text(re.sub(r"(\w+-virtual)(\.yaml)?", r"\1.yaml", text))
     actuator = ROOT / "models/actuators/bellow-bending.yaml"
     out = tmp_path / "run"
     outcome = rig("characterise", "--actuator", actuator, "--bench", bench, "--out", out)
