@@ -5,6 +5,9 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 NATIVE := $(wildcard firmware/host/*.* firmware/rig_mega/src/core/*.* rig/plant/native/*.*)
 
+# the matrices here are small: a second BLAS thread only fights with the second test process
+export OPENBLAS_NUM_THREADS := 1
+
 .PHONY: demo test setup check bench slow clean
 
 demo: $(READY)  ## characterise the default actuator on the virtual bench
