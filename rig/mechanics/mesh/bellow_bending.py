@@ -45,8 +45,8 @@ Indices = NDArray[np.int64]
 class BendingResolution:
     """Numbers of elements. Columns run down the side, rows along the actuator's axis."""
 
-    wall: int = 1
-    """Through the wall of crown and side."""
+    wall: int = 2
+    """Through the wall of crown and side. With one, angles come out 1.7 % too large."""
     floor: int = 1
     """Through the floor plate, which is twice as thick."""
     end_wall: int = 1
