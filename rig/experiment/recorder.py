@@ -20,6 +20,11 @@ class LinkRecorder:
         self._record = record
         self._frames: list[RawFrame] = []
         self._messages: list[Message] = []
+        self._may_drop = False
+
+    def drop_what_cannot_be_written(self) -> None:
+        """From now on an error of the disk loses the batch instead of reaching the link."""
+        self._may_drop = True
 
     def __call__(self, frames: Sequence[RawFrame], messages: Sequence[Message]) -> None:
         """Take a batch."""
@@ -30,6 +35,15 @@ class LinkRecorder:
 
     def flush(self) -> None:
         """Write what was gathered."""
+        try:
+            self._write()
+        except OSError:
+            if not self._may_drop:
+                raise
+        self._frames.clear()
+        self._messages.clear()
+
+    def _write(self) -> None:
         if not self._frames:
             return
         times, ids, payloads = zip(*self._frames, strict=True)
@@ -39,5 +53,3 @@ class LinkRecorder:
             by_name[message.name].append(message)
         for name, messages in by_name.items():
             self._record.telemetry(name, [m.time_s for m in messages], [m.values for m in messages])
-        self._frames.clear()
-        self._messages.clear()

@@ -178,6 +178,8 @@ def _recorded(context: RunContext, record: RunWriter, done: Collection[PointKey]
     except BaseException as unforeseen:  # the bench must be safe before anything else is told
         crash = unforeseen
         stop = StopDocument(exit_status="failed", reason=f"{type(crash).__name__}: {crash}")
+        # the log may be what broke (a full disk): venting must not depend on it
+        recorder.drop_what_cannot_be_written()
     try:
         ending = _make_safe(context)
         recorder.flush()

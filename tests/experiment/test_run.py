@@ -8,6 +8,7 @@ import subprocess
 import sys
 import textwrap
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -24,6 +25,7 @@ from rig.plant.plant import Faults
 from rig.record.documents import PointDocument
 from rig.record.errors import RecordError
 from rig.record.reader import RunReader
+from rig.record.writer import RunWriter
 
 from .conftest import ROOT, VirtualRun, make_request, take, take_rest
 from .truth import errors
@@ -116,6 +118,28 @@ def test_a_full_disk_vents_first_and_says_what_to_do(tmp_path: Path) -> None:
     log = RunReader(tmp_path / "run")
     assert len(log.points()) == 1
     assert log.telemetry("HEARTBEAT")["valve_open"][-1] == 1
+
+
+def test_a_disk_that_fills_between_points_does_not_keep_the_bench_from_venting(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write, full = RunWriter.can_frames, False
+    benches: list[VirtualBench] = []
+
+    def fills(self: RunWriter, *batch: Any) -> None:
+        nonlocal full
+        full = full or benches[0].plant.truth().gauge_pressure > 4e3
+        if full:
+            raise OSError(28, "No space left on device")
+        write(self, *batch)
+
+    monkeypatch.setattr(RunWriter, "can_frames", fills)
+    monkeypatch.setattr("rig.experiment.recorder.BATCH_FRAMES", 10)
+    with pytest.raises(RecordError, match="Free space"):
+        take(tmp_path / "run", make_request(), prepare=benches.append)
+    truth = benches[0].plant.truth()
+    assert abs(truth.gauge_pressure) < 50.0
+    assert truth.pushed_volume < 1e-8
 
 
 def test_a_dark_picture_ends_the_run_instead_of_a_point_without_a_value(tmp_path: Path) -> None:
