@@ -1,11 +1,12 @@
 """The virtual bench's truth, in a file of its own that no experiment opens.
 
-One channel `/truth`: time, pressure, angle, force as they really were, ten times a second.
+One channel `/truth`: time, pressure, angle, force as they really were, at every poll of the link.
 """
 
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -13,8 +14,8 @@ from typing import BinaryIO
 from mcap.writer import CompressionType, Writer
 
 from rig.plant.plant import GRAVITY, Truth
+from rig.record.channels import LOG_FILE
 
-LOG_FILE = "run.mcap"
 SCHEMA = {
     "type": "object",
     "title": "truth",
@@ -53,7 +54,7 @@ class TruthFile:
         stamp = round(time_s * 1e9)
         row = (
             f'{{"time_s":{time_s:.3f},"pressure_kpa":{truth.gauge_pressure / 1e3:.6f},'
-            f'"angle_deg":{truth.angle * 57.29577951308232:.6f},'
+            f'"angle_deg":{math.degrees(truth.angle):.6f},'
             f'"force_g":{truth.force / GRAVITY * 1e3:.6f},'
             f'"volume_ml":{truth.actuator_volume * 1e6:.6f}}}'
         )

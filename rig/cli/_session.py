@@ -173,11 +173,7 @@ def new_session(actuator: Path, bench: str, protocol: str, seed: int) -> Session
 def resumed_session(run: Path) -> Session:
     """A session from the specs and seed that are recorded in a run."""
     reader = RunReader(run)
-    texts = {
-        name: data.decode() for name, data in reader.attachments().items() if name.endswith(".yaml")
-    }
-    setup = Setup.from_attachments(texts, reader.path)
-    return _session(setup, reader.start().seed, run.parent)
+    return _session(reader.setup(), reader.start().seed, run.parent)
 
 
 def _session(setup: Setup, seed: int, logs: Path) -> Session:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 from rig.experiment.errors import ExperimentError
 from rig.experiment.plan import TRIP_MARGIN
-from rig.experiment.sweep import go_to, settle
+from rig.experiment.sweep import reach_top
 from rig.link.client import RigLink
 from rig.link.errors import CommandRefusedError, LinkError
 from rig.link.faults import HINTS
@@ -35,25 +33,20 @@ def board_parameters(
 
     `cavity_volume` of the actuator in m3 enters the feed-forward only.
     """
-    area = math.pi * bench.syringe.inner_diameter**2 / 4
-    steps_per_metre = (
-        bench.stepper.steps_per_revolution * bench.stepper.microsteps / bench.lead_screw.lead
-    )
-    volume_per_step = area / steps_per_metre
-    tube = math.pi * bench.tubing.inner_diameter**2 / 4 * bench.tubing.length
-    system = bench.syringe.volume + bench.syringe.dead_volume + tube + cavity_volume
+    syringe, tube = bench.syringe, bench.tubing
+    system = syringe.volume + syringe.dead_volume + tube.volume + cavity_volume
+    max_flow = min(bench.controller.max_flow, bench.stepper.max_step_rate * bench.volume_per_step)
     controller = bench.controller
     return {
         "proportional_ml_s_kpa": controller.proportional * 1e9,
         "integral_ml_s2_kpa": controller.integral * 1e9,
         "feed_forward": controller.feed_forward,
         "deadband_kpa": controller.deadband / 1e3,
-        "max_flow_ml_s": min(controller.max_flow, bench.stepper.max_step_rate * volume_per_step)
-        * 1e6,
+        "max_flow_ml_s": max_flow * 1e6,
         "max_flow_acceleration_ml_s2": controller.max_flow_acceleration * 1e6,
         "setpoint_rate_kpa_s": controller.setpoint_rate / 1e3,
-        "syringe_volume_ml": bench.syringe.volume * 1e6,
-        "volume_per_step_ul": volume_per_step * 1e9,
+        "syringe_volume_ml": syringe.volume * 1e6,
+        "volume_per_step_ul": bench.volume_per_step * 1e9,
         "system_volume_ml": system * 1e6,
         "ambient_pressure_kpa": bench.ambient.pressure / 1e3,
         "transducer_gain_kpa_v": transducer.gain / 1e3,
@@ -123,11 +116,11 @@ def leave_home(link: RigLink) -> None:
     link.wait(OFF_HOME_S)
 
 
-def condition(link: RigLink, top_kpa: float, section: SweepProtocol) -> None:
-    """One cycle to the top pressure and back, against first-cycle effects of the elastomer."""
-    go_to(link, top_kpa)
-    settle(link, top_kpa, section.settling)
-    vent(link)
+def condition(link: RigLink, section: SweepProtocol) -> None:
+    """Cycles to the top pressure and back, against first-cycle effects of the elastomer."""
+    for _ in range(section.conditioning):
+        reach_top(link, section)
+        vent(link)
 
 
 def vent(link: RigLink) -> None:

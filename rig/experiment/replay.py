@@ -19,7 +19,6 @@ from rig.experiment.measure import read_angle
 from rig.link.schema import load_schema
 from rig.record.documents import AngleReading, PointDocument, PointKey
 from rig.record.reader import RunReader
-from rig.spec.workspace import Setup
 from rig.vision.measure import AngleMeter
 
 
@@ -44,12 +43,7 @@ class ReplayedRun(RunReader):
 
     def __init__(self, run: Path) -> None:
         super().__init__(run)
-        texts = {
-            name: data.decode()
-            for name, data in self.attachments().items()
-            if name.endswith(".yaml")
-        }
-        self._calibrations = Setup.from_attachments(texts, self.path).calibrations
+        self._calibrations = self.setup().calibrations
 
     def recorded_points(self) -> tuple[PointDocument, ...]:
         """The points as they were taken."""

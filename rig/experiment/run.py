@@ -217,6 +217,8 @@ def _experiments(
         if sweep.experiment != mounted:
             mounted = sweep.experiment
             _mount(context, mounted)
+            observer.stage("conditioning the actuator")
+            condition(link, context.request.plan.settings(mounted))
         _sweep(context, record, recorder, sweep, left)
 
 
@@ -245,9 +247,6 @@ def _sweep(
     section = context.request.plan.settings(sweep.experiment)
     measure = _measurement(context, sweep.experiment)
     observer.stage(f"resting vented before repeat {sweep.repeat}")
-    if sweep.repeat == 1:
-        for _ in range(section.conditioning):
-            condition(link, section.pressures.stop / 1e3, section)
     link.wait(section.rest)
     leave_home(link)
     approach(link, left[0], section)

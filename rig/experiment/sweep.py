@@ -72,15 +72,20 @@ def settle(link: RigLink, target_kpa: float, settling: Settling) -> float:
     )
 
 
+def reach_top(link: RigLink, section: SweepProtocol) -> None:
+    """Go to the highest pressure of the protocol and settle there."""
+    top_kpa = section.pressures.stop / 1e3
+    go_to(link, top_kpa)
+    settle(link, top_kpa, section.settling)
+
+
 def approach(link: RigLink, key: PointKey, section: SweepProtocol) -> None:
     """Reach a point of the descending leg as the sweep would: over the top pressure.
 
     Needed only when a run is taken up again in the middle of that leg.
     """
     if key.direction == "down":
-        top_kpa = section.pressures.stop / 1e3
-        go_to(link, top_kpa)
-        settle(link, top_kpa, section.settling)
+        reach_top(link, section)
         link.wait(section.hold)
 
 

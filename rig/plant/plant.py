@@ -206,10 +206,6 @@ def plant_parameters(
     """
     assert bench.virtual is not None
     virtual = bench.virtual
-    area = np.pi * bench.syringe.inner_diameter**2 / 4
-    steps_per_metre = (
-        bench.stepper.steps_per_revolution * bench.stepper.microsteps / bench.lead_screw.lead
-    )
     radius = bench.tubing.inner_diameter / 2
     tube_resistance = 8 * AIR_VISCOSITY * bench.tubing.length / (np.pi * radius**4)
     counts_per_newton = load_cell.counts_per_gram * (1 + errors.counts_per_gram) / (1e-3 * GRAVITY)
@@ -217,12 +213,12 @@ def plant_parameters(
     return {
         "ambient_pressure": bench.ambient.pressure,
         "ambient_temperature": bench.ambient.temperature,
-        "volume_per_step": area / steps_per_metre,
-        "backlash_volume": area * bench.lead_screw.backlash,
+        "volume_per_step": bench.volume_per_step,
+        "backlash_volume": bench.syringe.area * bench.lead_screw.backlash,
         "syringe_volume": bench.syringe.volume,
         "dead_volume": bench.syringe.dead_volume,
         "start_volume": errors.start_volume,
-        "tube_volume": np.pi * radius**2 * bench.tubing.length,
+        "tube_volume": bench.tubing.volume,
         "tube_resistance": tube_resistance,
         # the valve vents through a short piece of the same tube (a guess; the paper has no valve)
         "valve_resistance": tube_resistance,

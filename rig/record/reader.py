@@ -43,6 +43,7 @@ from rig.record.documents import (
 from rig.record.errors import RecordError
 from rig.record.mcap_format import MALFORMED, chunk_data, iter_messages, read_channel, scan_log
 from rig.record.telemetry import columns
+from rig.spec.workspace import Setup
 
 AnyDocument = TypeVar("AnyDocument", bound=Document)
 LEVEL_NAMES: dict[int, Level] = {number: name for name, number in LEVELS.items()}
@@ -135,6 +136,18 @@ class RunReader:
     def attachments(self) -> dict[str, bytes]:
         """The attached files by name."""
         return {entry.index.name: entry.data for entry in self._found.attachments}
+
+    def setup(self) -> Setup:
+        """The specs and calibrations that the run was made with.
+
+        Raises SpecError for attachments that are missing or broken.
+        """
+        texts = {
+            name: data.decode(errors="replace")
+            for name, data in self.attachments().items()
+            if name.endswith(".yaml")
+        }
+        return Setup.from_attachments(texts, self.path)
 
     def points(self) -> tuple[PointDocument, ...]:
         """Every complete point in the order of measurement."""

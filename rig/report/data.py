@@ -66,14 +66,9 @@ def load_run(reader: RunReader) -> RunData:
 
     Raises RecordError for a damaged log and SpecError for attachments that are missing or broken.
     """
-    texts = {
-        name: data.decode(errors="replace")
-        for name, data in reader.attachments().items()
-        if name.endswith(".yaml")
-    }
     return RunData(
         reader=reader,
-        setup=Setup.from_attachments(texts, reader.path),
+        setup=reader.setup(),
         points=reader.points(),
         trace=_trace(reader.telemetry("PRESSURE")),
     )

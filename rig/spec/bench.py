@@ -51,6 +51,11 @@ class Syringe(SpecModel):
     inner_diameter: Length = Field(gt=0)
     dead_volume: Volume = Field(ge=0, description="left when the plunger is fully in")
 
+    @property
+    def area(self) -> float:
+        """Cross-section of the plunger in m2."""
+        return math.pi * self.inner_diameter**2 / 4
+
 
 class Stepper(SpecModel):
     """The motor that turns the lead screw, and how finely it is driven."""
@@ -72,6 +77,11 @@ class Tubing(SpecModel):
 
     inner_diameter: Length = Field(gt=0)
     length: Length = Field(gt=0)
+
+    @property
+    def volume(self) -> float:
+        """Volume of gas in the tube in m3."""
+        return math.pi * self.inner_diameter**2 / 4 * self.length
 
 
 class Transducer(SpecModel):
@@ -230,6 +240,12 @@ class BenchSpec(SpecModel):
     safety: Safety
     ambient: Ambient
     virtual: VirtualBench | None = None
+
+    @property
+    def volume_per_step(self) -> float:
+        """Volume in m3 that one step pulse sweeps."""
+        pulses = self.stepper.steps_per_revolution * self.stepper.microsteps
+        return self.syringe.area * self.lead_screw.lead / pulses
 
     @model_validator(mode="after")
     def _parts_fit_together(self) -> BenchSpec:

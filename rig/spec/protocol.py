@@ -63,7 +63,10 @@ class SweepProtocol(SpecModel):
     settling: Settling = Settling()
     hold: Duration = Field(30.0, ge=0, le=DAY_S, description="wait after settling, against creep")
     conditioning: Integer = Field(
-        0, ge=0, le=100, description="cycles to the top pressure before the first repeat"
+        0,
+        ge=0,
+        le=100,
+        description="cycles to the top pressure before the first sweep, and after a resumption",
     )
     rest: Duration = Field(
         10.0, ge=0, le=DAY_S, description="vented rest before each repeat (our choice)"

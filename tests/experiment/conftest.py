@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -20,7 +21,7 @@ from rig.spec.protocol import ProtocolSpec
 from rig.spec.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[2]
-SHORT = {
+SHORT: dict[str, Any] = {
     "kind": "protocol",
     "name": "short",
     "deformation": {

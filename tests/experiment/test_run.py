@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 import signal
 import subprocess
@@ -27,7 +28,7 @@ from rig.record.errors import RecordError
 from rig.record.reader import RunReader
 from rig.record.writer import RunWriter
 
-from .conftest import ROOT, VirtualRun, make_request, take, take_rest
+from .conftest import ROOT, SHORT, VirtualRun, make_request, take, take_rest
 from .truth import errors
 
 ANGLE_TARGET_DEG = 0.2
@@ -238,6 +239,24 @@ def test_an_interrupted_run_is_vented_readable_and_resumable(
     assert whole.value is not None
     assert rest.value is not None
     assert rest.value == pytest.approx(whole.value, abs=0.5)
+
+
+def test_the_actuator_is_conditioned_before_the_first_point_of_each_session(
+    tmp_path: Path,
+) -> None:
+    protocol = copy.deepcopy(SHORT)
+    del protocol["blocked_force"]
+    protocol["deformation"]["conditioning"] = 1
+    stopper, request = StopsAfter(2), make_request(protocol)
+    run = take(tmp_path / "run", request, observer=stopper, interrupted=stopper.check)
+    resumed = take_rest(run.folder, request)
+    assert resumed.outcome.stop.exit_status == "success"
+    points, pressure = resumed.reader.points(), resumed.reader.telemetry("PRESSURE")
+    # the resumed log goes on where the last point kept was measured
+    sessions = [(0.0, points[0].started_s), (points[1].measured_to_s, points[2].started_s)]
+    for begin_s, first_s in sessions:
+        before = (pressure["time_s"] > begin_s + 0.5) & (pressure["time_s"] < first_s)
+        assert pressure["pressure_kpa"][before].max() > 9.9
 
 
 @pytest.mark.parametrize(
