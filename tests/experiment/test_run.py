@@ -63,6 +63,16 @@ def test_every_point_is_held_after_settling(short_run: VirtualRun) -> None:
         assert point.measured_from_s - point.settled_s >= 1.0 + 2.0  # window and hold
 
 
+def test_sweeps_start_off_the_home_switch_so_that_0_kpa_can_be_regulated(
+    short_run: VirtualRun,
+) -> None:
+    pressure = short_run.reader.telemetry("PRESSURE")
+    for point in short_run.reader.points():
+        if point.key.target_kpa == 0.0 and point.key.direction == "up":
+            started = int(pressure["time_s"].searchsorted(point.started_s))
+            assert pressure["plunger_ml"][started] > 0.5
+
+
 def test_the_pressure_is_regulated_to_the_set_point(short_run: VirtualRun) -> None:
     truth = short_run.truth()
     for experiment in ("deformation", "blocked_force"):

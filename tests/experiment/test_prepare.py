@@ -1,0 +1,61 @@
+"""Taking over a bench in whatever state an earlier session left it."""
+
+from __future__ import annotations
+
+from rig.board.virtual import VirtualBench
+from rig.experiment.prepare import board_parameters, make_ready, take_over, write_parameters
+from rig.experiment.sweep import go_to, settle
+from rig.link.client import RigLink
+from rig.spec.protocol import Settling
+
+from .conftest import make_request
+
+WATCHDOG_AND_VENT_S = 20.0
+
+
+def under_pressure() -> tuple[VirtualBench, dict[str, float]]:
+    """A bench at 5 kPa, as a host leaves it that goes away."""
+    setup = make_request().setup
+    bench = VirtualBench(setup, seed=1)
+    parameters = board_parameters(setup.bench, setup.actuator, setup.calibrations.transducer, 13e-6)
+    link = RigLink(bench.bus)
+    link.open()
+    write_parameters(link, parameters)
+    make_ready(link)
+    go_to(link, 5.0)
+    settle(link, 5.0, Settling())
+    return bench, parameters
+
+
+def test_a_board_that_still_regulates_is_vented_before_parameters_are_written() -> None:
+    bench, parameters = under_pressure()
+    link = RigLink(bench.bus)
+    link.open()
+    take_over(link)
+    assert abs(bench.plant.truth().gauge_pressure) < 50.0
+    assert link.status is not None
+    assert link.status.state == "idle"
+    write_parameters(link, parameters)
+
+
+def test_a_board_that_lost_its_host_is_cleared_of_that_fault() -> None:
+    bench, parameters = under_pressure()
+    bench.bus.poll(WATCHDOG_AND_VENT_S)
+    link = RigLink(bench.bus)
+    link.open()
+    assert link.status is not None
+    assert link.status.fault == "communication_lost"
+    take_over(link)
+    assert link.status.fault == "none"
+    write_parameters(link, parameters)
+
+
+def test_a_fault_is_cleared_even_while_the_plunger_is_still_coming_home() -> None:
+    bench, parameters = under_pressure()
+    bench.bus.poll(1.3)  # the watchdog waits a second: the plunger has just begun to retract
+    link = RigLink(bench.bus)
+    link.open()
+    take_over(link)
+    assert link.status is not None
+    assert link.status.fault == "none"
+    write_parameters(link, parameters)
