@@ -11,27 +11,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rig.mechanics.fe import (
-    Model,
-    Point,
-    PressureSurface,
-    RigidBody,
-    Solid,
-    Support,
-    discretise,
-    follow,
-    gravity,
-    rotation_vector,
-)
+from rig.mechanics.fe import Point, follow
 from rig.mechanics.fe.linear import SuperLU, default_solver
-from rig.mechanics.hyperelastic import neo_hookean_from
-from rig.mechanics.mesh.bellow_bending import mesh_bending_bellow
-from rig.spec.actuator import BellowBendingGeometry
+from rig.mechanics.simulate.bending import bending_model
+from rig.spec.workspace import Workspace
 
 TARGET_S = 20.0
 PRESSURES = np.linspace(0.0, 10e3, 11)
-DENSITY, GRAVITY = 1160.0, 9.81
-YOUNG, POISSON = 450e3, 0.49
 
 
 def main() -> None:
@@ -40,33 +26,12 @@ def main() -> None:
         print("{:<44}{:>14}".format(*row))
 
 
-def bellow() -> tuple[Model, Solid]:
-    """The default actuator of plain Agilus30, hanging, half by symmetry, with a rigid end cap."""
-    body = mesh_bending_bellow(BellowBendingGeometry(family="bellow-bending"))
-    d = discretise(body.mesh)
-    material = neo_hookean_from(YOUNG, POISSON)
-    assert material.volume is not None
-    solid = Solid(d, material.distortion, material.volume)
-    tip = d.nodes_on("cap")
-    centre = d.nodes[tip].mean(axis=0) * [1, 0, 1]
-    model = Model(
-        d,
-        [solid],
-        supports=[
-            Support.of(d, d.nodes_on("clamped"), (0, 1, 2)),
-            Support.of(d, d.nodes_on("symmetry"), (1,)),
-        ],
-        surface=PressureSurface(d, d.facets_on("cavity")),
-        dead_load=gravity(solid, DENSITY, np.array([GRAVITY, 0.0, 0.0])),
-        bodies=[RigidBody(d, tip, free=("x", "z", "about_y"), centre=centre)],
-    )
-    return model, solid
-
-
 def table() -> list[tuple[str, str]]:
     """What was measured, and how much."""
     start = time.perf_counter()
-    model, solid = bellow()
+    setup = Workspace.find().setup("bellow-bending")
+    actuator = bending_model(setup.actuator.geometry, setup.material)
+    model, solid = actuator.model, actuator.soft
     rows = [("mesh, basis, pattern", f"{time.perf_counter() - start:.2f} s")]
     state = model.start()
     free = solid.free_points(state.x, state.points[0])
@@ -82,7 +47,7 @@ def table() -> list[tuple[str, str]]:
     rows.append((f"factorise, {ours.name}", timed(lambda: ours.factorise(matrix))))
     rows.append(("factorise, SuperLU", timed(lambda: superlu.factorise(matrix))))
     result = follow(model, [Point(p) for p in PRESSURES])
-    angle = np.degrees(rotation_vector(result.solutions[-1].state.poses[0].rotation)[1])
+    angle = np.degrees(actuator.angle(result.solutions[-1].state))
     rows.append((f"0 to 10 kPa (target {TARGET_S:.0f} s)", f"{result.seconds:.1f} s"))
     rows.append(("  assembly", f"{result.assembly_seconds:.1f} s"))
     rows.append(("  linear systems", f"{result.solve_seconds:.1f} s"))

@@ -1,0 +1,1 @@
+"""Actuators as finite element models: one module a geometry family, results in field terms."""

@@ -1,0 +1,135 @@
+"""The bending bellow as a finite element model: half by symmetry, hanging from its connector.
+
+The connector's face holds the soft end wall; the end cap is an exact rigid body. Both follow the
+toolbox's model (Yao, He and Maiolino, Section IV-B): neo-Hookean unless the material says
+otherwise, mixed in pressure, follower pressure in the cavity, gravity along the axis.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.mechanics.bellow import BellowShape
+from rig.mechanics.errors import MechanicsError
+from rig.mechanics.fe import (
+    Model,
+    PressureSurface,
+    RigidBody,
+    Solid,
+    State,
+    Support,
+    discretise,
+    gravity,
+    rotation_vector,
+)
+from rig.mechanics.fe.model import Item
+from rig.mechanics.hyperelastic import Hyperelastic, Volumetric, hyperelastic_from
+from rig.mechanics.mesh.bellow_bending import BendingResolution, mesh_bending_bellow
+from rig.spec.actuator import BellowBendingGeometry
+from rig.spec.material import MaterialSpec
+
+Array = NDArray[np.float64]
+
+STANDARD_GRAVITY = 9.80665
+"""m/s2."""
+HANGING = (STANDARD_GRAVITY, 0.0, 0.0)
+"""Gravity of an actuator that hangs from its connector, m/s2: along x, towards the tip."""
+
+
+@dataclass(frozen=True)
+class BendingModel:
+    """Half of the actuator (y >= 0), with what turns its state into angles and volumes."""
+
+    model: Model
+    soft: Solid
+    shape: BellowShape
+    lower_edge: NDArray[np.int64]
+    """Nodes of the soft body's far lower edge, x = L + t at the underside."""
+
+    def angle(self, state: State) -> float:
+        """Bending angle in rad: the end cap against the connector."""
+        return float(rotation_vector(state.poses[0].rotation)[1])
+
+    def chord_angle(self, state: State) -> float:
+        """The toolbox's 2 atan(w / (L + 2 t - u)) of the cap's far lower edge, in rad.
+
+        It is the bending angle of a perfect arc; the difference tells how far from one it is.
+        """
+        x, z = self.tip(state)
+        return float(2 * np.arctan2(self.shape.underside - z, x))
+
+    def tip(self, state: State) -> Array:
+        """The cap's far lower edge, (2,) as (x, z) in m."""
+        body, pose = self.model.bodies[0], state.poses[0]
+        edge = np.array([self.shape.tip, 0.0, self.shape.underside])
+        moved = body.centre + pose.shift + pose.rotation @ (edge - body.centre)
+        return np.asarray(moved[[0, 2]])
+
+    def volume(self, half: float) -> float:
+        """Volume of the whole cavity in m3 from that of the modelled half."""
+        return 2 * half
+
+
+def bending_model(
+    geometry: BellowBendingGeometry,
+    material: MaterialSpec,
+    *,
+    resolution: BendingResolution | None = None,
+    acceleration: tuple[float, float, float] = HANGING,
+    cap_density: float | None = None,
+    items: tuple[Item, ...] = (),
+) -> BendingModel:
+    """Mesh the actuator and put its model together.
+
+    `acceleration` is gravity in m/s2. The paper is silent about the cap's material; its weight is
+    that of `cap_density` in kg/m3, by default the soft material's: both are printed photopolymers.
+    `items` act on the model beside pressure and weight, such as an obstacle for its tip.
+    Raises MechanicsError for a material without a volumetric energy.
+    """
+    energies = hyperelastic_from(material)
+    body = mesh_bending_bellow(geometry, resolution)
+    d = discretise(body.mesh)
+    density = material.density.value
+    soft = Solid(d, energies.distortion, _volumetric(energies, material))
+    shape = body.shape
+    weight = shape.cap_mass(density if cap_density is None else cap_density) / 2
+    cap = d.nodes_on("cap")
+    middle = [
+        shape.effective_length + shape.wall + shape.cap_thickness / 2,
+        0.0,
+        float(d.nodes[cap, 2].mean()),
+    ]
+    model = Model(
+        d,
+        [soft],
+        supports=[
+            Support.of(d, d.nodes_on("clamped"), (0, 1, 2)),
+            Support.of(d, d.nodes_on("symmetry"), (1,)),
+        ],
+        surface=PressureSurface(d, d.facets_on("cavity")),
+        dead_load=gravity(soft, density, np.array(acceleration)),
+        bodies=[
+            RigidBody(
+                d,
+                cap,
+                free=("x", "z", "about_y"),
+                centre=np.array(middle),
+                weight=weight * np.array(acceleration),
+            )
+        ],
+        items=items,
+    )
+    return BendingModel(model, soft, shape, body.bottom_far_edge)
+
+
+def _volumetric(energies: Hyperelastic, material: MaterialSpec) -> Volumetric:
+    if energies.volume is None:
+        raise MechanicsError(
+            f"material '{material.name}': the mixed finite elements need a volumetric energy of "
+            "their own, which 'linear' and 'saint-venant-kirchhoff' do not have. Use another "
+            "'hyperelastic' energy, or leave the section out for neo-Hookean."
+        )
+    return energies.volume
