@@ -72,6 +72,20 @@ def ring(radial: int, around: int, inner: float, outer: float):
     return curved.with_boundaries({"bore": bore})
 
 
+def curved_triangles(quads):
+    """A ring of triangles with true arcs for sides, from one of quads; its bore is named, too."""
+    straight = skfem.MeshQuad1(quads.p[:, : quads.nvertices], quads.t).to_meshtri()
+    places = skfem.MeshTri2.from_mesh(straight).doflocs.copy()
+    away = np.linalg.norm(straight.p, axis=0)
+    middle = places[:, straight.nvertices :]
+    middle *= away[straight.facets].mean(axis=0) / np.linalg.norm(middle, axis=0)
+    curved = skfem.MeshTri2(places, straight.t)
+    facets = curved.boundary_facets()
+    inner = away.min()
+    bore = facets[np.all(np.abs(away[curved.facets[:, facets]] - inner) < 1e-9 * inner, axis=0)]
+    return curved.with_boundaries({"bore": bore})
+
+
 @dataclass(frozen=True)
 class Tube:
     """A soft box beam, one end clamped, the other a rigid cap, thicker at the bottom; half of it

@@ -21,7 +21,7 @@ from rig.mechanics.fe import (
     traction,
 )
 from rig.mechanics.hyperelastic import MooneyRivlin, NeoHookean, QuadraticVolume
-from tests.mechanics.fe_problems import meshes, ring
+from tests.mechanics.fe_problems import curved_triangles, meshes, ring
 
 MESHES = meshes()
 
@@ -103,7 +103,7 @@ def _inflated(d, supports, bore_dof: int, bore: float):
 def _pressure_of_cylinder(n: int, family: str) -> float:
     mesh = ring(n, 2 * n, INNER, OUTER)
     if family == "triangles":
-        mesh = _triangles(mesh)
+        mesh = curved_triangles(mesh)
     d = discretise(mesh, Kinematics.PLANE_STRAIN)
     supports = [Support.of(d, d.nodes_at(x=0.0), (0,)), Support.of(d, d.nodes_at(y=0.0), (1,))]
     corner = 2 * int(d.nodes_at(x=INNER, y=0.0)[0])
@@ -113,26 +113,11 @@ def _pressure_of_cylinder(n: int, family: str) -> float:
 def _pressure_of_sphere(n: int, family: str) -> float:
     mesh = ring(n, 2 * n, INNER, OUTER)
     if family == "triangles":
-        mesh = _triangles(mesh)
+        mesh = curved_triangles(mesh)
     d = discretise(mesh, Kinematics.AXISYMMETRIC)
     supports = [Support.of(d, d.nodes_at(r=0.0), (0,)), Support.of(d, d.nodes_at(z=0.0), (1,))]
     corner = 2 * int(d.nodes_at(r=INNER, z=0.0)[0])
     return _inflated(d, supports, corner, SPHERE["bore"]).pressure
-
-
-def _triangles(mesh):
-    """Triangles with true arcs for sides, from a ring of quads."""
-    straight = skfem.MeshQuad1(mesh.p[:, : mesh.nvertices], mesh.t).to_meshtri()
-    curved = skfem.MeshTri2.from_mesh(straight)
-    places = curved.doflocs.copy()
-    radius = np.linalg.norm(straight.p[:, straight.facets], axis=0).mean(axis=0)
-    middle = places[:, straight.nvertices :]
-    middle *= radius / np.linalg.norm(middle, axis=0)
-    curved = skfem.MeshTri2(places, curved.t)
-    facets = curved.boundary_facets()
-    away = np.linalg.norm(curved.p[:, curved.facets[:, facets]], axis=0)
-    bore = facets[np.all(np.abs(away - INNER) < 1e-9 * OUTER, axis=0)]
-    return curved.with_boundaries({"bore": bore})
 
 
 @pytest.mark.parametrize(

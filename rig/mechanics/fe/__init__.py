@@ -16,6 +16,8 @@ from rig.mechanics.fe.control import (
 )
 from rig.mechanics.fe.discretisation import Discretisation, Kinematics, discretise
 from rig.mechanics.fe.errors import FiniteElementError, MeshError
+from rig.mechanics.fe.extremes import Extremes, Peak, summarise
+from rig.mechanics.fe.fields import Fields, NodalFields, nodal_fields
 from rig.mechanics.fe.loads import gravity, traction
 from rig.mechanics.fe.model import Model, Support
 from rig.mechanics.fe.newton import Options
@@ -31,11 +33,15 @@ __all__ = [
     "Control",
     "Discretisation",
     "DisplacementControl",
+    "Extremes",
+    "Fields",
     "FiniteElementError",
     "Kinematics",
     "MeshError",
     "Model",
+    "NodalFields",
     "Options",
+    "Peak",
     "Point",
     "Pose",
     "PressureControl",
@@ -51,6 +57,8 @@ __all__ = [
     "discretise",
     "follow",
     "gravity",
+    "nodal_fields",
     "rotation_vector",
+    "summarise",
     "traction",
 ]

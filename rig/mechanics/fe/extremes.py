@@ -1,0 +1,107 @@
+"""The largest stresses and strains of a solution: how much, where, and what to make of it.
+
+A maximum next to a re-entrant edge or the end of a clamp grows with every finer mesh. Beside every
+maximum stands therefore the value that 99.5 % of the material's volume stays below: it has a
+limit as the mesh is refined, singular edge or not, because the volume above a given stress has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.mechanics.fe.fields import Fields, point_fields, recovered
+from rig.mechanics.fe.model import Model
+from rig.mechanics.fe.path import Solution
+
+Array = NDArray[np.float64]
+
+BULK_SHARE = 0.995
+"""Share of the volume at rest that stays below the value told as `Peak.bulk`."""
+
+
+@dataclass(frozen=True)
+class Peak:
+    """The largest value of a field."""
+
+    value: float
+    """Recovered at the nodes."""
+    place: Array
+    """Where, in m at rest, (dim,)."""
+    solid: int
+    """In which of the model's solids."""
+    bulk: float
+    """Value at quadrature points that 99.5 % of the volume stays below; of all solids."""
+
+
+@dataclass(frozen=True)
+class Extremes:
+    """Largest stresses and strains at one pressure."""
+
+    pressure: float
+    """Pressure of the cavity in Pa."""
+    von_mises: Peak
+    """Equivalent Cauchy stress in Pa."""
+    principal_stress: Peak
+    """Largest principal Cauchy stress in Pa."""
+    nominal_stress: Peak
+    """Largest principal nominal stress in Pa: what a data sheet's strength is."""
+    principal_strain: Peak
+    """Largest engineering principal strain: what a data sheet's elongation is."""
+    compression: Peak
+    """Largest shortening, 1 less the smallest principal stretch."""
+
+
+def summarise(model: Model, solution: Solution) -> Extremes:
+    """Largest stresses and strains of a model at one of its solutions."""
+    state = solution.state
+    inside = [
+        point_fields(solid, state.x, points)
+        for solid, points in zip(model.solids, state.points, strict=True)
+    ]
+    outside = [recovered(s, at) for s, at in zip(model.solids, inside, strict=True)]
+    nodes = model.discretisation.nodes
+    peaks = {
+        name: _peak(
+            [measure(fields) for fields in outside],
+            [nodes[fields.nodes] for fields in outside],
+            [measure(fields) for fields in inside],
+            [fields.weights for fields in inside],
+        )
+        for name, measure in _MEASURES.items()
+    }
+    return Extremes(pressure=solution.pressure, **peaks)
+
+
+_MEASURES: dict[str, Callable[[Fields], Array]] = {
+    "von_mises": lambda fields: fields.von_mises,
+    "principal_stress": lambda fields: fields.principal_stress[0],
+    "nominal_stress": lambda fields: fields.nominal_stress[0],
+    "principal_strain": lambda fields: fields.principal_stretch[0] - 1,
+    "compression": lambda fields: 1 - fields.principal_stretch[2],
+}
+
+
+def _peak(
+    at_nodes: list[Array], places: list[Array], at_points: list[Array], weights: list[Array]
+) -> Peak:
+    solid = int(np.argmax([values.max() for values in at_nodes]))
+    node = int(np.argmax(at_nodes[solid]))
+    values = np.concatenate([v.reshape(-1) for v in at_points])
+    volumes = np.concatenate([w.reshape(-1) for w in weights])
+    return Peak(
+        value=float(at_nodes[solid][node]),
+        place=places[solid][node],
+        solid=solid,
+        bulk=volume_percentile(values, volumes, BULK_SHARE),
+    )
+
+
+def volume_percentile(values: Array, volumes: Array, share: float) -> float:
+    """The smallest of `values` (n,) that `share` of the `volumes` (n,) is not above."""
+    order = np.argsort(values, kind="stable")
+    below = np.cumsum(volumes[order])
+    return float(values[order][np.searchsorted(below, share * below[-1])])
