@@ -18,7 +18,8 @@ PATIENCE = 3
 class Interruption:
     """Whether somebody asked to stop; ask it with `check` where stopping is safe."""
 
-    def __init__(self) -> None:
+    def __init__(self, doing: str = "stopping and venting") -> None:
+        self._doing = doing
         self._signal: int | None = None
         self._count = 0
 
@@ -30,7 +31,7 @@ class Interruption:
         if self._count > PATIENCE:
             raise KeyboardInterrupt
         left = PATIENCE + 1 - self._count
-        hint = f"stopping and venting; {left} more to give up on that"
+        hint = f"{self._doing}; {left} more to give up on that"
         # a handler may run inside any print: write to the descriptor, not to the stream
         with contextlib.suppress(OSError):
             os.write(2, f"\nrig: {hint}\n".encode())
@@ -48,9 +49,9 @@ class Interruption:
 
 
 @contextmanager
-def catching_signals() -> Iterator[Interruption]:
-    """SIGINT and SIGTERM go to the Interruption inside."""
-    interruption = Interruption()
+def catching_signals(doing: str = "stopping and venting") -> Iterator[Interruption]:
+    """SIGINT and SIGTERM go to the Interruption inside; `doing` is what the first one is told."""
+    interruption = Interruption(doing)
     numbers = (signal.SIGINT, signal.SIGTERM)
     before = [signal.signal(number, interruption.note) for number in numbers]
     try:

@@ -33,9 +33,11 @@ def compare(
     from rich.console import Console
     from rich.markup import escape
 
+    from rig.cli._calculation import calculating
     from rig.report.compare import read_runs, write_comparison
 
-    named = read_runs(runs)
+    with calculating(Console(stderr=True)) as job:
+        named = read_runs(runs, job)
     experiments = write_comparison(out, named)
     if as_json:
         typer.echo(_as_json(named))

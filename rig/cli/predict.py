@@ -54,11 +54,18 @@ def predict(
 
     Nothing moves: this only computes.
 
-    Example: `rig predict --actuator models/actuators/bellow-bending.yaml --csv beam.csv`
+    Finite elements take a while the first time; their results are kept and found again. Exits 1
+    if a model got no further than some pressure, with what it reached in the table.
+
+    Example: `rig predict --actuator models/actuators/bellow-bending.yaml --csv both.csv`
 
     Which pressures bend it by 0 to 90 degrees:
     `rig predict --actuator SPEC --control angle --targets 0:90:10`
     """
+    from rich.console import Console
+
+    from rig.cli._calculation import calculating
+    from rig.mechanics.errors import MechanicsError
     from rig.mechanics.model import predict as predict_response
     from rig.mechanics.table import rows
     from rig.spec.loading import load_actuator
@@ -68,13 +75,17 @@ def predict(
     material = Workspace.find(actuator).material(spec.material)
     grid = _pressure_grid(spec, pressures)
     wanted = _target_grid(control, targets)
-    table = []
-    for name in _models(spec, model):
-        response = predict_response(spec, material, name, grid)
-        table += rows(response if wanted is None else _controlled(response, control, wanted))
+    table, notes = [], []
+    with calculating(Console(stderr=True)) as job:
+        for name in _models(spec, model):
+            response = predict_response(spec, material, name, grid, job)
+            table += rows(response if wanted is None else _controlled(response, control, wanted))
+            notes += [f"The model {name} is incomplete: {note}" for note in response.notes]
     _show(spec.name, material.name, table)
     if csv is not None:
         _write(csv, table)
+    if notes:
+        raise MechanicsError("\n".join(notes))
 
 
 def _models(spec: ActuatorSpec, model: str | None) -> list[str]:

@@ -28,6 +28,7 @@ def replay(
     """
     from rich.console import Console
 
+    from rig.cli._calculation import calculating
     from rig.cli._summary import show_summary
     from rig.experiment.replay import ReplayedRun
     from rig.report.build import build_report
@@ -37,7 +38,8 @@ def replay(
     folder = out or replayed.path.parent / "replay"
     with console.status("measuring the recorded images again"):
         differences = replayed.differences()
-    summary = build_report(folder, replayed)
+    with calculating(console) as job:
+        summary = build_report(folder, replayed, job=job)
     show_summary(console, summary, folder)
     if replayed.problem is not None:
         console.print(

@@ -28,13 +28,15 @@ def report(
     """
     from rich.console import Console
 
+    from rig.cli._calculation import calculating
     from rig.cli._summary import show_summary
     from rig.record.reader import RunReader
     from rig.report.build import build_report
 
     reader = RunReader(run)
     folder = out or reader.path.parent
-    summary = build_report(folder, reader)
+    with calculating(Console(stderr=True)) as job:
+        summary = build_report(folder, reader, job=job)
     if as_json:
         typer.echo(summary.to_json(), nl=False)
     else:

@@ -1,12 +1,12 @@
 """Prediction by name: one registry of (geometry family, model), one function `predict`.
 
-A new family or model registers a `Predictor`; nothing else changes.
+A new family or model registers a `Predictor`; nothing else changes. Finite elements are imported
+when they are asked for: beam theory alone must answer at once.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,20 +14,22 @@ from numpy.typing import ArrayLike, NDArray
 from rig.mechanics.beam import BeamTheory
 from rig.mechanics.blocked import blocked_force
 from rig.mechanics.errors import MechanicsError
+from rig.mechanics.job import Job
 from rig.mechanics.profile import cavity_volume
 from rig.mechanics.response import Response
-from rig.spec.actuator import ActuatorSpec, BellowBendingGeometry
+from rig.spec.actuator import ActuatorSpec
 from rig.spec.material import MaterialSpec
 
 Array = NDArray[np.float64]
-Predictor = Callable[[Any, MaterialSpec, Array], Response]
-"""Geometry of the family, material and pressures in Pa to the response."""
+Predictor = Callable[[ActuatorSpec, MaterialSpec, Array, Job], Response]
+"""Actuator, material, pressures in Pa and how to carry it out, to the response."""
 
 
 def beam_of_bending_bellow(
-    geometry: BellowBendingGeometry, material: MaterialSpec, pressures: Array
+    actuator: ActuatorSpec, material: MaterialSpec, pressures: Array, _job: Job
 ) -> Response:
     """Beam theory of the paper with our blocked force; MechanicsError where geometry runs out."""
+    geometry = actuator.geometry
     theory = BeamTheory.of(geometry, material)
     highest = float(pressures[-1])
     if highest > theory.limit_pressure:
@@ -49,8 +51,18 @@ def beam_of_bending_bellow(
     )
 
 
+def finite_elements(
+    actuator: ActuatorSpec, material: MaterialSpec, pressures: Array, job: Job
+) -> Response:
+    """The family's finite element model; not a number beyond the pressure that it reached."""
+    from rig.mechanics.simulate.prediction import finite_element_response
+
+    return finite_element_response(actuator, material, pressures, job)
+
+
 _PREDICTORS: dict[tuple[str, str], Predictor] = {
     ("bellow-bending", "beam"): beam_of_bending_bellow,
+    ("bellow-bending", "fe"): finite_elements,
 }
 
 
@@ -60,9 +72,15 @@ def available_models(family: str) -> tuple[str, ...]:
 
 
 def predict(
-    actuator: ActuatorSpec, material: MaterialSpec, model: str, pressures: ArrayLike
+    actuator: ActuatorSpec,
+    material: MaterialSpec,
+    model: str,
+    pressures: ArrayLike,
+    job: Job | None = None,
 ) -> Response:
     """Response of `actuator` made of `material` at gauge `pressures` in Pa, (n,), ascending.
+
+    `job` says where long calculations keep their results and who watches them.
 
     Raises MechanicsError for a model this version does not have, pressures that are not finite,
     negative or not ascending, above the actuator's limit, or beyond the model's range.
@@ -74,7 +92,7 @@ def predict(
             f"there is no model '{model}' for the family '{family}'; this version has: "
             f"{', '.join(available_models(family)) or 'none'}."
         )
-    return predictor(actuator.geometry, material, _checked(actuator, pressures))
+    return predictor(actuator, material, _checked(actuator, pressures), job or Job())
 
 
 def _checked(actuator: ActuatorSpec, pressures: ArrayLike) -> Array:

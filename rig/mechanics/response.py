@@ -5,7 +5,6 @@ The interface is the same for beam theory and finite elements; the virtual speci
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -21,7 +20,8 @@ Array = NDArray[np.float64]
 class Response:
     """Quasi-static response; every array has the shape (n,) of `pressure`, SI units.
 
-    A quantity that the model cannot give is None.
+    A quantity that the model cannot give is None. From the pressure on at which a calculation got
+    no further its values are not a number, and a note says why.
     """
 
     model: str
@@ -37,6 +37,8 @@ class Response:
     """Volume of the cavity in m3, tip free."""
     max_von_mises: Array | None = None
     """Largest von Mises stress in Pa, tip free."""
+    notes: tuple[str, ...] = ()
+    """What a reader must know, such as why values are missing."""
 
     def at(self, pressure: ArrayLike) -> Response:
         """Response at other pressures in Pa, (m,), by monotone cubic interpolation (PCHIP).
@@ -52,15 +54,20 @@ class Response:
                 f"{high / 1e3:.4g} kPa; {wanted.min() / 1e3:.4g} to {wanted.max() / 1e3:.4g} kPa "
                 f"was asked for. Predict over a wider range of pressures."
             )
-        interpolate = self._interpolator(np.clip(wanted, low, high))
+        inside = np.clip(wanted, low, high)
+
+        def there(values: Array) -> Array:
+            return interpolated(self.pressure, values, inside)
+
         return Response(
             model=self.model,
             pressure=wanted,
-            angle=interpolate(self.angle),
-            displacement=interpolate(self.displacement),
-            blocked_force=None if self.blocked_force is None else interpolate(self.blocked_force),
-            volume=interpolate(self.volume),
-            max_von_mises=None if self.max_von_mises is None else interpolate(self.max_von_mises),
+            angle=there(self.angle),
+            displacement=there(self.displacement),
+            blocked_force=None if self.blocked_force is None else there(self.blocked_force),
+            volume=there(self.volume),
+            max_von_mises=None if self.max_von_mises is None else there(self.max_von_mises),
+            notes=self.notes,
         )
 
     def pressure_for(self, quantity: Literal["angle", "volume"], values: ArrayLike) -> Array:
@@ -69,7 +76,9 @@ class Response:
         Raises MechanicsError where the quantity does not grow with pressure or never gets there.
         """
         wanted = np.atleast_1d(np.asarray(values, dtype=float))
-        known: Array = getattr(self, quantity)
+        values_known: Array = getattr(self, quantity)
+        reached = np.isfinite(values_known)
+        known, pressure = values_known[reached], self.pressure[reached]
         if known.size < 2 or np.any(np.diff(known) <= 0):
             raise MechanicsError(
                 f"the {quantity} of model '{self.model}' does not grow all the way with pressure, "
@@ -80,28 +89,42 @@ class Response:
             shown, unit = (np.degrees, "deg") if quantity == "angle" else (_millilitres, "mL")
             raise MechanicsError(
                 f"model '{self.model}' reaches {shown(known[0]):.4g} to {shown(known[-1]):.4g} "
-                f"{unit} between {self.pressure[0] / 1e3:.4g} and {self.pressure[-1] / 1e3:.4g} "
+                f"{unit} between {pressure[0] / 1e3:.4g} and {pressure[-1] / 1e3:.4g} "
                 f"kPa; {shown(outside[0]):.4g} {unit} is outside. Ask for less, or widen the "
                 f"range of pressures."
             )
         from scipy.interpolate import PchipInterpolator
 
-        curve = PchipInterpolator(self.pressure, known)
+        curve = PchipInterpolator(pressure, known)
         roots = [curve.solve(value, extrapolate=False) for value in wanted]
         # an end value may miss its own polynomial by round-off: the end is the answer then
         return np.array(
             [
-                found[0] if found.size else self.pressure[np.argmin(np.abs(known - value))]
+                found[0] if found.size else pressure[np.argmin(np.abs(known - value))]
                 for found, value in zip(roots, wanted, strict=True)
             ]
         )
 
-    def _interpolator(self, pressure: Array) -> Callable[[Array], Array]:
-        if self.pressure.size == 1:
-            return lambda values: np.full_like(pressure, values[0])
-        from scipy.interpolate import PchipInterpolator
 
-        return lambda values: np.asarray(PchipInterpolator(self.pressure, values)(pressure))
+def interpolated(pressure: Array, values: Array, at: Array) -> Array:
+    """Values (n,) over ascending pressures at other pressures, by monotone cubics (PCHIP).
+
+    Not a number beyond the last pressure at which `values` is known.
+    """
+    known = np.isfinite(values)
+    result = np.full(at.shape, np.nan)
+    if not known.any():
+        return result
+    pressure, values = pressure[known], values[known]
+    covered = (at >= pressure[0]) & (at <= pressure[-1] * (1 + 1e-12))
+    if pressure.size == 1:
+        result[covered] = values[0]
+        return result
+    from scipy.interpolate import PchipInterpolator
+
+    inside = np.minimum(at[covered], pressure[-1])
+    result[covered] = PchipInterpolator(pressure, values)(inside)
+    return result
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +52,8 @@ from rig.validate.uncertainty import Component, Estimate, combine
 
 Array = NDArray[np.float64]
 STANDARD_GRAVITY = 9.80665
+PRESSURE_NOISE_KPA = 0.03
+"""A mean pressure may lie this far beyond where a model ends and still be compared with it."""
 QUANTITIES: dict[ExperimentName, str] = {
     "deformation": "bending angle",
     "blocked_force": "blocked force",
@@ -394,11 +397,15 @@ def _models(
     span: float | None,
     transducer: TransducerCalibration,
 ) -> dict[str, ModelSummary]:
-    return {
-        model: _model(name, levels, ModelCurve(response, name), span or 0.0, transducer)
-        for model, response in predictions.items()
-        if levels and predicted_value(response, name) is not None
-    }
+    found = {}
+    for model, response in predictions.items():
+        if predicted_value(response, name) is None:
+            continue
+        curve = ModelCurve(response, name)
+        covered = [v for v in levels if curve.reaches(float(v.pressures_kpa.mean()))]
+        if covered:
+            found[model] = _model(name, covered, curve, span or 0.0, transducer)
+    return found
 
 
 @dataclass(frozen=True)
@@ -410,6 +417,18 @@ class ModelCurve:
 
     response: Response
     experiment: ExperimentName
+
+    def reaches(self, pressure_kpa: float) -> bool:
+        """Whether the model answers for a pressure, give or take the noise of one."""
+        return pressure_kpa <= self._top / 1e3 + PRESSURE_NOISE_KPA
+
+    @cached_property
+    def _top(self) -> float:
+        """Highest pressure in Pa at which there is an answer."""
+        predicted = predicted_value(self.response, self.experiment)
+        assert predicted is not None
+        known = self.response.pressure[np.isfinite(predicted)]
+        return float(known[-1]) if known.size else -math.inf
 
     def value(self, pressures_kpa: Array) -> Array:
         """Prediction in deg or grams-force, the shape of `pressures_kpa`."""
@@ -424,8 +443,7 @@ class ModelCurve:
         return float((high - low) / (around[1] - around[0]))
 
     def _inside(self, pressures_kpa: Array) -> Array:
-        pressures = self.response.pressure
-        return np.clip(pressures_kpa * 1e3, pressures[0], pressures[-1])
+        return np.clip(pressures_kpa * 1e3, self.response.pressure[0], self._top)
 
 
 def _model(

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from rig.mechanics.errors import MechanicsError
+from rig.mechanics.job import Job
 from rig.mechanics.model import predict
 from rig.mechanics.response import Response
 from rig.record.reader import RunReader
@@ -35,25 +36,27 @@ class Analysis:
     summary: RunSummary
 
 
-def analyse(reader: RunReader) -> Analysis:
-    """Predict and summarise a run.
+def analyse(reader: RunReader, job: Job | None = None) -> Analysis:
+    """Predict and summarise a run; `job` is how long predictions are carried out.
 
     Raises RecordError or SpecError for a log that does not hold the set-up of a run.
     """
     data = load_run(reader)
-    predictions, notes = _predictions(data)
+    predictions, notes = _predictions(data, job or Job())
     return Analysis(data, predictions, summarise(data, predictions, _published(), notes))
 
 
-def build_report(folder: Path, reader: RunReader | None = None) -> RunSummary:
+def build_report(
+    folder: Path, reader: RunReader | None = None, job: Job | None = None
+) -> RunSummary:
     """Write summary.json, CSV tables and report.html of a run into `folder`.
 
     The run is that of `reader`, by default the one recorded in `folder`; nothing but its log is
-    read. Raises RecordError or SpecError for a log that does not hold a run, ReportError if the
-    folder cannot be written.
+    read. `job` is how long predictions are carried out. Raises RecordError or SpecError for a log
+    that does not hold a run, ReportError if the folder cannot be written.
     """
     reader = reader or RunReader(folder)
-    analysis = analyse(reader)
+    analysis = analyse(reader, job)
     page = render_report(analysis.data, analysis.summary, analysis.predictions)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -75,7 +78,7 @@ def write_text(path: Path, text: str) -> None:
     partial.replace(path)
 
 
-def _predictions(data: RunData) -> tuple[dict[str, Response], list[str]]:
+def _predictions(data: RunData, job: Job) -> tuple[dict[str, Response], list[str]]:
     """The models' responses over the pressures of the run, and why some are missing."""
     actuator, material = data.setup.actuator, data.setup.material
     sections = [data.setup.protocol.deformation, data.setup.protocol.blocked_force]
@@ -86,9 +89,11 @@ def _predictions(data: RunData) -> tuple[dict[str, Response], list[str]]:
     notes: list[str] = []
     for model in actuator.predictions:
         try:
-            found[model] = predict(actuator, material, model, pressures)
+            found[model] = predict(actuator, material, model, pressures, job)
         except MechanicsError as error:
             notes.append(f"There is no prediction of the model {model}: {error}")
+            continue
+        notes += [f"The model {model}: {note}" for note in found[model].notes]
     return found, notes
 
 

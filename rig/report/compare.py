@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rig.mechanics.job import Job
 from rig.record.documents import ExperimentName
 from rig.record.reader import RunReader
 from rig.report.build import analyse, write_text
@@ -49,8 +50,8 @@ class Agreement:
         return self.beyond == 0
 
 
-def read_runs(folders: Sequence[Path]) -> list[NamedRun]:
-    """Analyse each run from its log.
+def read_runs(folders: Sequence[Path], job: Job | None = None) -> list[NamedRun]:
+    """Analyse each run from its log; `job` is how long predictions are carried out.
 
     Raises ReportError for fewer than two runs, and what `analyse` raises for each.
     """
@@ -58,7 +59,7 @@ def read_runs(folders: Sequence[Path]) -> list[NamedRun]:
         raise ReportError("a comparison needs at least two runs. Name more run folders.")
     names = _names(folders)
     return [
-        NamedRun(name, analyse(RunReader(folder)).summary)
+        NamedRun(name, analyse(RunReader(folder), job).summary)
         for name, folder in zip(names, folders, strict=True)
     ]
 

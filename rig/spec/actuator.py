@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 from rig.spec.base import Count, Name, SpecModel, require
 from rig.spec.quantity import Length, Pressure, Ratio
 
-ModelName = Literal["beam"]
+ModelName = Literal["beam", "fe"]
 
 
 class BellowBendingGeometry(SpecModel):

@@ -99,6 +99,8 @@ class Result:
     failure: str | None
     """Where and why the path ended early; None when it was finished."""
     seconds: float
+    cancelled: bool = False
+    """Whether the watcher ended it."""
 
     @property
     def solves(self) -> int:
@@ -151,7 +153,7 @@ def follow(
             break
         state = arrived.state
         solutions.append(Solution(state, arrived.assembly.volume, arrived.assembly.residual))
-    return Result(tuple(solutions), tuple(run.history), failure, clock() - begin)
+    return Result(tuple(solutions), tuple(run.history), failure, clock() - begin, run.cancelled)
 
 
 class _Run:
@@ -169,6 +171,7 @@ class _Run:
         self.solver = solver
         self.clock = clock
         self.history: list[StepRecord] = []
+        self.cancelled = False
         self._past: list[tuple[float, State]] = []
         self._kind = ""
         self._step = 1.0
@@ -209,6 +212,7 @@ class _Run:
             )
             self.history.append(record)
             if not told(record):
+                self.cancelled = True
                 return self._words(outcome, point, fraction, "it was cancelled")
             if outcome.converged:
                 clean = self._clean(outcome.state)

@@ -68,9 +68,17 @@ class BendingModel:
         moved = body.centre + pose.shift + pose.rotation @ (edge - body.centre)
         return np.asarray(moved[[0, 2]])
 
-    def volume(self, half: float) -> float:
+    def displacement(self, state: State) -> float:
+        """Length difference in m between the fibres at the crests' cavity and at the underside.
+
+        The end faces stay plane, so it is the angle times the distance 2 ro + tb of these fibres.
+        """
+        shape = self.shape
+        return self.angle(state) * (2 * shape.outer_radius + shape.bottom_thickness)
+
+    def volume(self, modelled: float) -> float:
         """Volume of the whole cavity in m3 from that of the modelled half."""
-        return 2 * half
+        return 2 * modelled
 
 
 def bending_model(

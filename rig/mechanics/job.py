@@ -1,0 +1,28 @@
+"""How a long prediction is carried out: where results are kept, and who watches and may stop it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from rig.mechanics.store import NoStore, Store
+
+if TYPE_CHECKING:
+    from rig.mechanics.fe import Progress
+
+Watch = Callable[[str, "Progress"], bool]
+"""Told what is computed and how far it got; answers False to stop it."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """Keeps nothing and goes unwatched unless told otherwise."""
+
+    store: Store = field(default_factory=NoStore)
+    watch: Watch | None = None
+
+    def telling(self, what: str) -> Callable[[Progress], bool] | None:
+        """What a path reports its progress to."""
+        watch = self.watch
+        return None if watch is None else lambda progress: watch(what, progress)
