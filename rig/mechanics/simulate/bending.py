@@ -48,6 +48,8 @@ class BendingModel:
     shape: BellowShape
     lower_edge: NDArray[np.int64]
     """Nodes of the soft body's far lower edge, x = L + t at the underside."""
+    mirror: int = 1
+    """The plane of symmetry is y = 0."""
 
     def angle(self, state: State) -> float:
         """Bending angle in rad: the end cap against the connector."""
