@@ -16,11 +16,13 @@ from rig.mechanics.hyperelastic import LogarithmicVolume, NeoHookean, QuadraticV
 from tests.mechanics.fe_problems import BULK, SHEAR, distorted, meshes, scattered
 
 MESHES = meshes()
+ALONE = ", displacements alone"
+PROBLEMS = [*MESHES, *(f"{name}{ALONE}" for name in MESHES)]
 
 
 def _problem(name: str) -> tuple[Discretisation, Solid, np.ndarray, PointState]:
-    mesh, kinematics = MESHES[name]
-    d = discretise(mesh, kinematics)
+    mesh, kinematics = MESHES[name.removesuffix(ALONE)]
+    d = discretise(mesh, kinematics, mixed=not name.endswith(ALONE))
     solid = Solid(d, NeoHookean(1.0), LogarithmicVolume(20.0))
     rng = np.random.default_rng(3)
     x = 0.03 * rng.standard_normal(d.size)
@@ -101,7 +103,7 @@ def test_residual_and_tangent_are_those_of_scikit_fem_forms(name: str) -> None:
     np.testing.assert_allclose(found.tangent, expected_k, atol=1e-13 * np.abs(expected_k).max())
 
 
-@pytest.mark.parametrize("name", MESHES)
+@pytest.mark.parametrize("name", PROBLEMS)
 def test_residual_is_the_slope_of_the_energy(name: str) -> None:
     d, solid, x, points = _problem(name)
     step = 1e-6 * np.random.default_rng(4).standard_normal(d.size)
@@ -114,7 +116,7 @@ def test_residual_is_the_slope_of_the_energy(name: str) -> None:
     assert (energy(x + step) - energy(x - step)) / 2 == pytest.approx(slope, rel=1e-7)
 
 
-@pytest.mark.parametrize("name", MESHES)
+@pytest.mark.parametrize("name", PROBLEMS)
 def test_tangent_is_the_slope_of_the_residual_and_symmetric(name: str) -> None:
     d, solid, x, points = _problem(name)
     step = 1e-6 * np.random.default_rng(5).standard_normal(d.size)
@@ -133,7 +135,7 @@ def test_tangent_is_the_slope_of_the_residual_and_symmetric(name: str) -> None:
     np.testing.assert_allclose(found, expected, atol=1e-7 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("name", MESHES)
+@pytest.mark.parametrize("name", PROBLEMS)
 def test_independent_points_agree_where_strains_do(name: str) -> None:
     _, solid, x, points = _problem(name)
     plain = solid.evaluate(x, points)
@@ -144,7 +146,9 @@ def test_independent_points_agree_where_strains_do(name: str) -> None:
     np.testing.assert_allclose(mixed.tangent, plain.tangent, atol=1e-12 * scale)
 
 
-@pytest.mark.parametrize("name", ["hexahedra", "tetrahedra", "axisymmetric quads"])
+@pytest.mark.parametrize(
+    "name", ["hexahedra", "tetrahedra", "axisymmetric quads", f"tetrahedra{ALONE}"]
+)
 def test_independent_points_see_the_strain_of_the_displacements_to_first_order(name: str) -> None:
     _, solid, x, points = _problem(name)
     points = _at_rest_in_pressure(solid, x, points)

@@ -149,7 +149,7 @@ def test_pressure_control_finds_the_bore_that_displacement_control_was_given() -
     assert bore == pytest.approx(CYLINDER["bore"], rel=2e-4)
 
 
-def _cook(n: int, family: str) -> float:
+def _cook(n: int, family: str, mixed: bool = True) -> float:
     """Rise of the tip's upper corner of Cook's membrane, nu 0.4999, in plane strain."""
     mesh = skfem.MeshQuad.init_tensor(np.linspace(0, 1, n + 1), np.linspace(0, 1, n + 1))
     s, t = mesh.p
@@ -157,7 +157,7 @@ def _cook(n: int, family: str) -> float:
     mesh = skfem.MeshQuad(places, mesh.t)
     if family == "triangles":
         mesh = mesh.to_meshtri()
-    d = discretise(mesh, Kinematics.PLANE_STRAIN)
+    d = discretise(mesh, Kinematics.PLANE_STRAIN, mixed=mixed)
     solid = Solid(d, NeoHookean(80.1938), QuadraticVolume(400889.806))
     right = mesh.facets_satisfying(lambda x: np.isclose(x[0], 48.0))
     load = traction(d, right, np.array([0.0, 100.0 / 16.0]))
@@ -178,6 +178,15 @@ def test_cooks_membrane_does_not_lock_and_both_elements_agree() -> None:
         errors = np.abs(np.array(found[:3]) / reference - 1)
         assert errors[0] < 0.04
         assert np.all(errors[1:] < 0.6 * errors[:-1])
+
+
+@pytest.mark.parametrize("family", ["quads", "triangles"])
+def test_without_pressures_the_same_elements_lock(family: str) -> None:
+    alone = [_cook(n, family, mixed=False) for n in (2, 4, 8)]
+    mixed = [_cook(n, family) for n in (2, 4, 8)]
+    stiffer = 1 - np.array(alone) / np.array(mixed)
+    assert stiffer[0] > 0.05
+    assert np.all(np.diff(stiffer) < 0)
 
 
 def _cantilever(length: float, height: float, along: int):

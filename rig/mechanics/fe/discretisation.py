@@ -95,7 +95,7 @@ class Discretisation:
     """Per displacement component d F_entry / d u, (elements, q, entries, a), in 1/m; the entries
     are those of `kinematics.components`."""
     pressure_values: Array
-    """Pressure shape functions, (elements, q, m)."""
+    """Pressure shape functions, (elements, q, m); m = 0 without pressures."""
     pressure_connectivity: Integers | None
     """Pressure nodes of each element, (elements, m), or None where they are the element's own."""
     pressure_nodes: int
@@ -107,6 +107,11 @@ class Discretisation:
     def dim(self) -> int:
         """Displacement components per node."""
         return int(self.nodes.shape[1])
+
+    @property
+    def mixed(self) -> bool:
+        """Whether there are pressures beside the displacements."""
+        return bool(self.pressure_values.shape[2])
 
     @property
     def displacement_size(self) -> int:
@@ -149,8 +154,18 @@ class Discretisation:
         return np.flatnonzero(found)
 
 
-def discretise(mesh: Any, kinematics: Kinematics = Kinematics.SOLID) -> Discretisation:
-    """The mixed quadratic element on a scikit-fem mesh of hexahedra, tetrahedra, quads, triangles.
+def discretise(
+    mesh: Any,
+    kinematics: Kinematics = Kinematics.SOLID,
+    *,
+    mixed: bool = True,
+    order: int | None = None,
+) -> Discretisation:
+    """The quadratic element on a scikit-fem mesh of hexahedra, tetrahedra, quads, triangles.
+
+    `mixed` false leaves the pressures out: the displacement element of other programs, to compare
+    with them; it locks near incompressibility. `order` is that of the quadrature, by default one
+    that loses nothing.
 
     Raises MeshError for other cells, for a mesh of the wrong dimension, and for elements that are
     inverted or flat, telling which and where.
@@ -167,7 +182,7 @@ def discretise(mesh: Any, kinematics: Kinematics = Kinematics.SOLID) -> Discreti
             f"{kinematics.value} needs a mesh in {dim} dimensions; "
             f"{type(mesh).__name__} has {mesh.dim()}."
         )
-    basis = skfem.Basis(mesh, element, intorder=_QUADRATURE_ORDER[type(element)])
+    basis = skfem.Basis(mesh, element, intorder=order or _QUADRATURE_ORDER[type(element)])
     _check_orientation(mesh, basis)
     nodes = np.ascontiguousarray(basis.doflocs.T)
     connectivity = np.ascontiguousarray(basis.element_dofs.T).astype(np.int64)
@@ -182,7 +197,9 @@ def discretise(mesh: Any, kinematics: Kinematics = Kinematics.SOLID) -> Discreti
         weights *= 2 * np.pi * radius
         hoop = values / radius[..., None]
         gradients = (np.concatenate((gradient, hoop[:, :, None]), axis=2), gradient)
-    pressure_values, pressure_connectivity, pressure_nodes = _pressure_space(basis, weights)
+    pressure_values, pressure_connectivity, pressure_nodes = (
+        _pressure_space(basis, weights) if mixed else (np.zeros((*weights.shape, 0)), None, 0)
+    )
     return Discretisation(
         mesh=mesh,
         kinematics=kinematics,

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from rig.mechanics.fe.discretisation import Discretisation, Integers
 from rig.mechanics.fe.state import PointState
-from rig.mechanics.hyperelastic import Energy, Volumetric
+from rig.mechanics.hyperelastic import Energy, Hyperelastic, Volumetric
 from rig.mechanics.hyperelastic.tensors import (
     add_cofactor_slope,
     cofactor,
@@ -98,13 +98,17 @@ class Solid:
         volume: Volumetric,
         elements: Integers | None = None,
     ) -> None:
-        """All elements, or those given; `volume` must not be that of an incompressible solid."""
+        """All elements, or those given; `volume` must not be that of an incompressible solid.
+
+        On a discretisation without pressures displacements alone carry both energies.
+        """
         every = np.arange(len(discretisation.connectivity))
         self.elements = every if elements is None else np.asarray(elements, dtype=np.int64)
         self.discretisation = discretisation
+        d = discretisation
         self.distortion = distortion
         self.volume = volume
-        d = discretisation
+        self._law = distortion if d.mixed else Hyperelastic(distortion, volume)
         self._dim = d.dim
         self._components = d.kinematics.components
         self._gradients = _unique_arrays(d.gradients, self.elements)
@@ -142,7 +146,7 @@ class Solid:
         j = determinant(flat, cofactor(flat)).reshape(p.shape)
         j_of_p, _ = volume_ratio(self.volume, p)
         conjugate = p * j_of_p - self.volume.energy(j_of_p)
-        density = self.distortion.energy(f) + p * j - conjugate
+        density = self._law.energy(f) + p * j - conjugate
         return float(np.sum(self._weights * density))
 
     def free_points(self, x: Array, points: PointState) -> PointState:
@@ -151,7 +155,7 @@ class Solid:
         flat = f.reshape(3, 3, -1)
         cof = cofactor(flat)
         p = self.pressure(x, points).reshape(-1)
-        first = self.distortion.first_piola(f).reshape(3, 3, -1) + p * cof
+        first = self._law.first_piola(f).reshape(3, 3, -1) + p * cof
         inverse = _inverse(flat, cof)
         return PointState(
             points.pressure,
@@ -185,8 +189,8 @@ class Solid:
             r_p = np.einsum("eq,eqm->em", w * (at.j.reshape(w.shape) - j_of_p), phi)
             volume_error = 0.0
             if not self._continuous:
-                miss = np.abs(r_p).max(axis=1) / w.sum(axis=1)
-                volume_error = float(miss.max())
+                miss = np.abs(r_p).max(axis=1, initial=0.0) / w.sum(axis=1)
+                volume_error = float(miss.max(initial=0.0))
             r_u = self._divergence(at.stress, w, chunk)
             coupling = self._coupling(at.cofactor, w, phi, chunk)
             bulk = np.einsum("eq,eqm,eqn->emn", w * compliance, phi, phi)
@@ -237,7 +241,10 @@ class Solid:
             return points
         du = dx[self._u_dofs]
         modes = points.pressure
-        if modes.shape[1]:
+        if self._continuous:
+            d = self.discretisation
+            change = dx[d.displacement_size + _pressure_nodes(d)[self.elements]]
+        else:
             change = c.pressure + (c.pressure_slope @ du[:, :, None])[..., 0]
             modes = modes + length * change
         if points.strain is None or points.stress is None:
@@ -247,12 +254,7 @@ class Solid:
         linear = product(c.gradient.swapaxes(0, 1), df)
         strain = c.gap + (linear + linear.swapaxes(0, 1)) / 2
         slope = np.einsum("iakln,kln->ian", c.material, product(c.inverse.swapaxes(0, 1), strain))
-        if modes.shape[1]:
-            dp = (self._phi @ (change)[:, :, None]).reshape(-1)
-        else:
-            d = self.discretisation
-            nodal = dx[d.displacement_size + _pressure_nodes(d)[self.elements]]
-            dp = (self._phi @ nodal[:, :, None]).reshape(-1)
+        dp = (self._phi @ change[:, :, None]).reshape(-1)
         stress = product(c.inverse, c.stress + slope + dp * c.cofactor)
         return PointState(
             modes,
@@ -284,10 +286,10 @@ class Solid:
     def _point(self, f: Array, p: Array, points: PointState, chunk: slice, tangent: bool) -> _Point:
         if points.strain is None or points.stress is None:
             cof = cofactor(f)
-            stress = self.distortion.first_piola(f) + p * cof
+            stress = self._law.first_piola(f) + p * cof
             slope = None
             if tangent:
-                slope = self.distortion.tangent(f)
+                slope = self._law.tangent(f)
                 add_cofactor_slope(slope, p, f)
             j = determinant(f, cof)
             return _Point(stress, slope, cof, j, 0.0, float(j.min()))
@@ -298,8 +300,8 @@ class Solid:
         cof = cofactor(own)
         inverse = _inverse(own, cof)
         gap = (right_cauchy_green(f) - c) / 2
-        first = self.distortion.first_piola(own) + p * cof
-        material = self.distortion.tangent(own)
+        first = self._law.first_piola(own) + p * cof
+        material = self._law.tangent(own)
         add_cofactor_slope(material, p, own)
         second = product(inverse, first)
         _add_second(material, -second)
@@ -337,8 +339,8 @@ class Solid:
             g = self._gradients[i][chunk]
             s = np.moveaxis(weighted[list(entries)], 0, 2)[..., None] * phi[:, :, None]
             flat = g.reshape(len(g), -1, g.shape[3])
-            result[:, :, i] = flat.swapaxes(1, 2) @ s.reshape(len(w), -1, phi.shape[2])
-        return result.reshape(len(w), -1, phi.shape[2])
+            result[:, :, i] = flat.swapaxes(1, 2) @ s.reshape(*flat.shape[:2], phi.shape[2])
+        return result.reshape(len(w), self._u_dofs.shape[1], phi.shape[2])
 
     def _stiffness(self, slope: Array | None, w: Array, chunk: slice, out: Array) -> None:
         assert slope is not None

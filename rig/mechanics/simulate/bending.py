@@ -27,7 +27,12 @@ from rig.mechanics.fe import (
 )
 from rig.mechanics.fe.model import Item
 from rig.mechanics.hyperelastic import Hyperelastic, Volumetric, hyperelastic_from
-from rig.mechanics.mesh.bellow_bending import BendingResolution, mesh_bending_bellow
+from rig.mechanics.mesh.bellow_bending import (
+    BendingBellowMesh,
+    BendingResolution,
+    mesh_bending_bellow,
+)
+from rig.mechanics.mesh.bellow_tetrahedra import TetrahedralBellowMesh
 from rig.spec.actuator import BellowBendingGeometry
 from rig.spec.material import MaterialSpec
 
@@ -48,8 +53,10 @@ class BendingModel:
     shape: BellowShape
     lower_edge: NDArray[np.int64]
     """Nodes of the soft body's far lower edge, x = L + t at the underside."""
-    mirror: int = 1
-    """The plane of symmetry is y = 0."""
+    density: float
+    """Of the soft material in kg/m3."""
+    acceleration: tuple[float, float, float]
+    """Gravity in m/s2."""
 
     def angle(self, state: State) -> float:
         """Bending angle in rad: the end cap against the connector."""
@@ -99,9 +106,28 @@ def bending_model(
     `items` act on the model beside pressure and weight, such as an obstacle for its tip.
     Raises MechanicsError for a material without a volumetric energy.
     """
+    return bending_model_on(
+        mesh_bending_bellow(geometry, resolution),
+        material,
+        acceleration=acceleration,
+        cap_density=cap_density,
+        items=items,
+    )
+
+
+def bending_model_on(
+    body: BendingBellowMesh | TetrahedralBellowMesh,
+    material: MaterialSpec,
+    *,
+    mixed: bool = True,
+    order: int | None = None,
+    acceleration: tuple[float, float, float] = HANGING,
+    cap_density: float | None = None,
+    items: tuple[Item, ...] = (),
+) -> BendingModel:
+    """The same on a mesh that is there already; `mixed` and `order` as `discretise` takes them."""
     energies = hyperelastic_from(material)
-    body = mesh_bending_bellow(geometry, resolution)
-    d = discretise(body.mesh)
+    d = discretise(body.mesh, mixed=mixed, order=order)
     density = material.density.value
     soft = Solid(d, energies.distortion, _volumetric(energies, material))
     shape = body.shape
@@ -132,7 +158,7 @@ def bending_model(
         ],
         items=items,
     )
-    return BendingModel(model, soft, shape, body.bottom_far_edge)
+    return BendingModel(model, soft, shape, body.bottom_far_edge, density, acceleration)
 
 
 def _volumetric(energies: Hyperelastic, material: MaterialSpec) -> Volumetric:
