@@ -1,8 +1,7 @@
 """Builds rig; what the static metadata in pyproject.toml cannot say.
 
 The model library lives beside the package, where people edit it; a wheel carries it inside.
-Three extensions are compiled by cffi: the firmware's core for this machine, the bench's physics,
-and the kernels of the finite elements.
+Two extensions are compiled by cffi: the firmware's core for this machine, and the bench's physics.
 """
 
 from __future__ import annotations
@@ -62,6 +61,5 @@ setup(
     cffi_modules=[
         "firmware/host/build_firmware.py:ffibuilder",
         "rig/plant/native/build_plant.py:ffibuilder",
-        "rig/mechanics/fe/native/build_fe.py:ffibuilder",
     ],
 )

@@ -16,6 +16,7 @@ from rig.experiment.errors import AbortedError
 from rig.experiment.measure import AngleMeasurement, ForceMeasurement, Measurement
 from rig.experiment.plan import Sweep
 from rig.experiment.prepare import (
+    board_parameters,
     condition,
     leave_home,
     make_ready,
@@ -141,8 +142,12 @@ def _explaining_disk_errors(folder: Path) -> Iterator[None]:
 
 
 def _configure(link: RigLink, request: RunRequest) -> dict[str, float]:
+    setup = request.setup
     take_over(link)
-    return write_parameters(link, request.board_parameters())
+    wanted = board_parameters(
+        setup.bench, setup.actuator, setup.calibrations.transducer, request.cavity_volume
+    )
+    return write_parameters(link, wanted)
 
 
 def _versions(identity: Identity) -> dict[str, str]:

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from rig.mechanics.cad.stl import is_watertight, read_stl
+from tests.mechanics.deck_reader import read_deck
 
 from .conftest import Command
 
@@ -23,10 +24,26 @@ def test_stl_of_every_part_is_written_and_watertight(rig: Command, tmp_path: Pat
         assert is_watertight(read_stl(tmp_path / name))
 
 
+def test_an_input_deck_is_written_and_described(rig: Command, tmp_path: Path) -> None:
+    out = tmp_path / "bellow.inp"
+    outcome = rig(
+        *("export", "--actuator", ACTUATOR, "--inp", out),
+        *("--program", "abaqus", "--pressure", "8 kPa"),
+    )
+    assert outcome.code == 0
+    assert "C3D20RH for abaqus" in outcome.out
+    deck = read_deck(out)
+    assert deck.element_type == "C3D20RH"
+    assert {float(line[2]) for line in deck.all("DLOAD")[-1].lines} == {0.008}
+
+
 @pytest.mark.parametrize(
     ("arguments", "word"),
     [
         ((), "--stl"),
+        (("--inp", "x.inp", "--pressure", "3 mm"), "--pressure"),
+        (("--inp", "x.inp", "--pressure", "-3 kPa"), "above zero"),
+        (("--inp", "x.inp", "--size", "3 mm"), "--size"),
         (("--stl", "x.stl", "--tolerance", "2 kPa"), "0.01 mm"),
         (("--stl", "x.stl", "--tolerance", "0"), "out of range"),
     ],

@@ -47,7 +47,6 @@ struct Outputs {
   StepSchedule steps;
   bool motor_enabled;
   bool valve_open;
-  bool load_cell_powered;  // false for one tick restarts the HX711
 };
 
 class RigCore {
@@ -125,6 +124,7 @@ class RigCore {
   uint32_t host_silent_ticks_ = 0;
   uint16_t jog_ticks_ = 0;
   bool retracting_ = false;  // after a fault
+  bool zeroed_ = false;
   bool save_asked_ = false;
 
   uint8_t command_number_ = 0;

@@ -1,0 +1,179 @@
+"""The bending bellow as an input deck (`.inp`) of Abaqus or CalculiX: mm, N, MPa, tonne, s.
+
+The same mesh, sets, material, rigid cap and loads as the finite element model it is made from:
+first its weight, then the pressure of the cavity, which follows the deformed surface because the
+steps are geometrically nonlinear. Keywords after the Abaqus Keywords Guide and CalculiX CrunchiX
+User's Manual 2.20. The two part in the elements' names, and where CalculiX gives a rigid body's
+rotation a node of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.mechanics.deck.elements import Elements, Program, elements_of, faces_of
+from rig.mechanics.deck.errors import DeckError
+from rig.mechanics.deck.material import hyperelasticity
+from rig.mechanics.simulate.bending import BendingModel
+
+Indices = NDArray[np.int64]
+
+_MM = 1e3
+_TONNE_PER_MM3 = 1e-12
+_MEGAPASCAL = 1e6
+_PER_LINE = 16
+"""Entries of a data line at most, in both programs."""
+
+
+def write_deck(
+    path: Path,
+    actuator: BendingModel,
+    *,
+    pressure: float,
+    program: Program = Program.CALCULIX,
+    increments: int = 10,
+    title: str = "",
+) -> None:
+    """Write the deck for a cavity pressure in Pa reached in equal increments, as text.
+
+    Raises DeckError where the material or the elements have no counterpart, or `path` cannot be
+    written.
+    """
+    content = "\n".join(_lines(actuator, pressure, program, increments, title)) + "\n"
+    try:
+        path.write_text(content, encoding="ascii", errors="replace")
+    except OSError as error:
+        raise DeckError(
+            f"{path} cannot be written: {error.strerror}. Choose another file."
+        ) from error
+
+
+def _lines(
+    actuator: BendingModel, pressure: float, program: Program, increments: int, title: str
+) -> Iterator[str]:
+    d = actuator.soft.discretisation
+    elements = elements_of(d)
+    cap = actuator.model.bodies[0]
+    used = np.unique(elements.nodes)
+    reference, rotation = len(d.nodes) + 1, len(d.nodes) + 2
+    own_rotation = program is Program.CALCULIX
+
+    yield "*HEADING"
+    yield f"{title or 'bending bellow'}: half of it, y >= 0, by rig"
+    yield "** Units: mm, N, MPa, tonne, s. x along the axis, z up to the crests."
+    yield f"** Half a model: weight of the cap {cap.weight[0]:.6g} N is half of the cap's."
+    yield "*NODE, NSET=ALL"
+    for node in used:
+        yield _row(node + 1, *(_MM * d.nodes[node]))
+    yield "*NODE, NSET=CAP_REFERENCE"
+    yield _row(reference, *(_MM * cap.centre))
+    if own_rotation:
+        yield "*NODE, NSET=CAP_ROTATION"
+        yield _row(rotation, *(_MM * cap.centre))
+    yield f"*ELEMENT, TYPE={elements.type.names[program]}, ELSET=SOFT"
+    for number, nodes in enumerate(elements.nodes, start=1):
+        yield from _rows((number, *(nodes + 1)), carry_on=True)
+
+    cap_nodes = np.intersect1d(cap.nodes, used)
+    # the cap's own freedoms decide about its nodes on the plane of symmetry
+    symmetry = np.setdiff1d(np.intersect1d(d.nodes_on("symmetry"), used), cap_nodes)
+    clamped = np.intersect1d(d.nodes_on("clamped"), used)
+    for name, nodes in {"CLAMPED": clamped, "SYMMETRY": symmetry, "CAP": cap_nodes}.items():
+        yield f"*NSET, NSET={name}"
+        yield from _rows(nodes + 1)
+    faces = yield from _surfaces(actuator, elements)
+    yield from _material(actuator)
+    yield from _supports(reference, rotation if own_rotation else None)
+
+    size = float(np.linalg.norm(actuator.acceleration))
+    if size > 0:
+        yield from _step(1)
+        yield "*DLOAD"
+        direction = (c / size for c in actuator.acceleration)
+        yield "SOFT, GRAV, " + _row(_MM * size, *direction)
+        yield "*CLOAD"
+        for component, force in enumerate(cap.weight, start=1):
+            if force:
+                yield f"{reference}, {component}, {force:.9g}"
+        yield from _output(own_rotation)
+    yield from _step(increments)
+    yield "*DLOAD"
+    for face in faces:
+        yield f"CAVITY_{face}, P{face}, {pressure / _MEGAPASCAL:.9g}"
+    yield from _output(own_rotation)
+
+
+def _surfaces(actuator: BendingModel, elements: Elements) -> Generator[str, None, list[int]]:
+    """The cavity's wall as element sets by face and as a surface; returns the faces there are."""
+    d = actuator.soft.discretisation
+    owners = faces_of(elements, d.mesh, d.facets_on("cavity"))
+    faces = [int(face) + 1 for face in np.unique(owners[:, 1])]
+    for face in faces:
+        yield f"*ELSET, ELSET=CAVITY_{face}"
+        yield from _rows(np.sort(owners[owners[:, 1] == face - 1, 0]) + 1)
+    yield "*SURFACE, NAME=CAVITY, TYPE=ELEMENT"
+    for face in faces:
+        yield f"CAVITY_{face}, S{face}"
+    return faces
+
+
+def _material(actuator: BendingModel) -> Iterator[str]:
+    law = hyperelasticity(actuator.soft.distortion, actuator.soft.volume)
+    yield "*SOLID SECTION, ELSET=SOFT, MATERIAL=ELASTOMER"
+    yield ""
+    yield "*MATERIAL, NAME=ELASTOMER"
+    if law.remark:
+        yield f"** {law.remark}"
+    yield f"*HYPERELASTIC, {law.model}"
+    yield from (_row(*law.constants[i : i + 8]) for i in range(0, len(law.constants), 8))
+    yield "*DENSITY"
+    yield f"{actuator.density * _TONNE_PER_MM3:.9g}"
+
+
+def _supports(reference: int, rotation: int | None) -> Iterator[str]:
+    if rotation is None:
+        yield f"*RIGID BODY, REF NODE={reference}, TIE NSET=CAP"
+    else:
+        yield f"*RIGID BODY, NSET=CAP, REF NODE={reference}, ROT NODE={rotation}"
+    yield "*BOUNDARY"
+    yield "CLAMPED, 1, 3"
+    yield "SYMMETRY, 2, 2"
+    yield f"{reference}, 2, 2"
+    for axis in (1, 3):
+        if rotation is None:
+            yield f"{reference}, {axis + 3}, {axis + 3}"
+        else:
+            yield f"{rotation}, {axis}, {axis}"
+
+
+def _step(increments: int) -> Iterator[str]:
+    yield "*STEP, NLGEOM=YES, INC=1000"
+    yield "*STATIC"
+    yield f"{1 / increments:.9g}, 1, 1e-6, {1 / increments:.9g}"
+
+
+def _output(own_rotation: bool) -> Iterator[str]:
+    for name in ("CAP_REFERENCE", "CAP_ROTATION") if own_rotation else ("CAP_REFERENCE",):
+        yield f"*NODE PRINT, NSET={name}"
+        yield "U"
+    yield "*NODE FILE"
+    yield "U"
+    yield "*EL FILE"
+    yield "S, E"
+    yield "*END STEP"
+
+
+def _row(*values: float) -> str:
+    return ", ".join(f"{value:.12g}" for value in values)
+
+
+def _rows(numbers: Iterable[int], *, carry_on: bool = False) -> Iterator[str]:
+    """Integers, as many to a line as programs read; a comma at the end carries a record on."""
+    every = [str(int(number)) for number in numbers]
+    for start in range(0, len(every), _PER_LINE):
+        line = ", ".join(every[start : start + _PER_LINE])
+        yield line + ("," if carry_on and start + _PER_LINE < len(every) else "")
