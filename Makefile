@@ -3,7 +3,8 @@
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
-NATIVE := $(wildcard firmware/host/*.* firmware/rig_mega/src/core/*.* rig/plant/native/*.*)
+NATIVE := $(wildcard firmware/host/*.* firmware/rig_mega/src/core/*.* rig/plant/native/*.* \
+	rig/mechanics/fe/native/*.*)
 
 # the matrices here are small: a second BLAS thread only fights with the second test process
 export OPENBLAS_NUM_THREADS := 1

@@ -1,7 +1,8 @@
 """Builds rig; what the static metadata in pyproject.toml cannot say.
 
 The model library lives beside the package, where people edit it; a wheel carries it inside.
-Two extensions are compiled by cffi: the firmware's core for this machine, and the bench's physics.
+Three extensions are compiled by cffi: the firmware's core for this machine, the bench's physics,
+and the kernels of the finite elements.
 """
 
 from __future__ import annotations
@@ -61,5 +62,6 @@ setup(
     cffi_modules=[
         "firmware/host/build_firmware.py:ffibuilder",
         "rig/plant/native/build_plant.py:ffibuilder",
+        "rig/mechanics/fe/native/build_fe.py:ffibuilder",
     ],
 )

@@ -1,4 +1,4 @@
-"""Generates firmware/rig_mega/src/core/generated from firmware/rig.dbc.
+"""Generates the firmware's C and the manual's table of parameters from firmware/rig.dbc.
 
 The result is committed, because the Arduino IDE must open the sketch as it is; a test proves that
 it has not drifted. Run from anywhere: `python firmware/generate.py`.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import cantools
 from cantools.database.can.c_source import generate
@@ -15,6 +16,8 @@ from cantools.database.can.c_source import generate
 FIRMWARE = Path(__file__).resolve().parent
 SCHEMA = FIRMWARE / "rig.dbc"
 GENERATED = FIRMWARE / "rig_mega" / "src" / "core" / "generated"
+MANUAL = FIRMWARE.parent / "docs" / "firmware"
+_WRITTEN_IN_EVERY_STATE = "DUMMY_NODE_VECTOR3"
 
 _SCHEMA_HEADER = """\
 // Generated from rig.dbc by firmware/generate.py; do not edit.
@@ -30,6 +33,36 @@ constexpr uint16_t kSchemaCrc = 0x{crc:04X};
 }}  // namespace rig
 """
 
+_RULES = """\
+// Generated from rig.dbc by firmware/generate.py; do not edit.
+#pragma once
+
+#include "../parameters.h"
+
+namespace rig {{
+
+// Default, least, greatest, live.
+constexpr ParameterRule kParameterRules[] = {{
+{rows}
+}};
+
+}}  // namespace rig
+"""
+
+_MANUAL = """\
+# Parameters of the board
+
+Generated from `firmware/rig.dbc` by `python firmware/generate.py`; do not edit.
+
+Written one at a time, checked, kept on `save` with version and CRC. *any*: may be written in every
+state; *rest*: only while nothing moves and the valve is open. `rig firmware parameters list` shows
+what a board holds.
+
+| index | name | unit | default | least | most | when | meaning |
+| --- | --- | --- | --- | --- | --- | --- | --- |
+{rows}
+"""
+
 
 def crc16_ccitt_false(data: bytes) -> int:
     """CRC-16/CCITT-FALSE: polynomial 0x1021, start 0xFFFF."""
@@ -41,8 +74,8 @@ def crc16_ccitt_false(data: bytes) -> int:
     return crc
 
 
-def generated_files(schema: Path = SCHEMA) -> dict[str, str]:
-    """Names and contents of the generated files."""
+def generated_files(schema: Path = SCHEMA) -> dict[Path, str]:
+    """Paths and contents of the generated files."""
     text = schema.read_bytes().replace(b"\r\n", b"\n")
     database = cantools.database.load_string(text.decode(), "dbc")
     header, source, _, _ = generate(
@@ -56,11 +89,43 @@ def generated_files(schema: Path = SCHEMA) -> dict[str, str]:
         node_name="RIG",
     )
     version = database.dbc.attributes["ProtocolVersion"].value
+    parameters = _parameters(database)
     return {
-        "rig.h": _undated(header),
-        "rig.c": _undated(source),
-        "schema.h": _SCHEMA_HEADER.format(version=version, crc=crc16_ccitt_false(text)),
+        GENERATED / "rig.h": _undated(header),
+        GENERATED / "rig.c": _undated(source),
+        GENERATED / "schema.h": _SCHEMA_HEADER.format(version=version, crc=crc16_ccitt_false(text)),
+        GENERATED / "parameter_rules.h": _RULES.format(rows="\n".join(map(_rule, parameters))),
+        MANUAL / "parameters.md": _MANUAL.format(rows="\n".join(map(_row, parameters))),
     }
+
+
+def _parameters(database: Any) -> list[Any]:
+    """The schema's environment variables in the order of their indices, which have no gap."""
+    parameters = sorted(database.dbc.environment_variables.values(), key=lambda p: p.env_id)
+    names = database.get_message_by_name("PARAMETER").get_signal_by_name("parameter_index").choices
+    assert {p.env_id: p.name for p in parameters} == {i: str(n) for i, n in names.items()}
+    assert [p.env_id for p in parameters] == list(range(len(parameters)))
+    return parameters
+
+
+def _rule(parameter: Any) -> str:
+    numbers = (parameter.initial_value, parameter.minimum, parameter.maximum)
+    live = "true" if parameter.access_type == _WRITTEN_IN_EVERY_STATE else "false"
+    return f"    {{{', '.join(f'{float(x)!r}f' for x in numbers)}, {live}}},  // {parameter.name}"
+
+
+def _row(parameter: Any) -> str:
+    when = "any" if parameter.access_type == _WRITTEN_IN_EVERY_STATE else "rest"
+    numbers = (parameter.initial_value, parameter.minimum, parameter.maximum)
+    cells = (
+        str(parameter.env_id),
+        f"`{parameter.name}`",
+        parameter.unit or "1",
+        *(f"{x:g}" for x in numbers),
+        when,
+        parameter.comment,
+    )
+    return f"| {' | '.join(cells)} |"
 
 
 def _undated(text: str) -> str:
@@ -70,9 +135,9 @@ def _undated(text: str) -> str:
 
 
 def main() -> None:
-    GENERATED.mkdir(parents=True, exist_ok=True)
-    for name, content in generated_files().items():
-        (GENERATED / name).write_text(content, encoding="utf-8", newline="\n")
+    for path, content in generated_files().items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(content, encoding="utf-8", newline="\n")
 
 
 if __name__ == "__main__":

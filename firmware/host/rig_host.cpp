@@ -31,7 +31,7 @@ struct rig_host {
   rig_host(uint32_t firmware_git, uint8_t reset_cause)
       : board{kHostBoard, firmware_git, static_cast<rig::ResetCause>(reset_cause)},
         nonvolatile(rig::Parameters::kImageSize, kErased) {
-    out.valve_open = 1;
+    out.valve_open = out.hx711_powered = 1;
   }
 
   void boot() { core.reset(new rig::RigCore(board, nonvolatile.data())); }
@@ -56,7 +56,7 @@ struct rig_host {
     inputs.home_switch = in.home_switch != 0;
     inputs.end_switch = in.end_switch != 0;
     inputs.emergency_stop = in.emergency_stop != 0;
-    if (in.hx711_ready) core->load_cell_word(in.hx711_word);
+    if (in.hx711_ready && core->outputs().load_cell_powered) core->load_cell_word(in.hx711_word);
   }
 
   // Of the steps of a tick, those of its first or second millisecond.
@@ -67,6 +67,7 @@ struct rig_host {
     out.steps = outputs.steps.inward ? steps : -steps;
     out.motor_enabled = outputs.motor_enabled;
     out.valve_open = outputs.valve_open;
+    out.hx711_powered = outputs.load_cell_powered;
   }
 
   void millisecond(rig_bench_fn bench_fn, void *bench) {

@@ -23,10 +23,11 @@ typedef struct {
   uint32_t hx711_word;
 } rig_pins_in;
 
-/* Signed step pulses in this millisecond (+ pushes air in), and two levels. */
+/* Signed step pulses in this millisecond (+ pushes air in), and three levels; an HX711 that is not
+ * powered gives no words and starts anew. */
 typedef struct {
   int32_t steps;
-  uint8_t motor_enabled, valve_open;
+  uint8_t motor_enabled, valve_open, hx711_powered;
 } rig_pins_out;
 
 /* Advances the bench by 1 ms. */

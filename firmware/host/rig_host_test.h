@@ -97,6 +97,9 @@ typedef struct {
   int home_switch_stuck;        /* always closed */
   int sensor;                   /* 0 live, 1 open (low), 2 short (high), 3 frozen, 4 ADC dead */
   uint32_t hx711_stuck_word;    /* if not 0, every word reads this */
+  int hx711_asleep;             /* 1: no words until it is restarted */
+  int hx711_shifted;            /* 1: words lost a clock edge, until it is restarted */
+  int hx711_line_low;           /* a word of zeros seems to be ready all the time */
   /* state, to be read */
   double time_s;
   double plunger_ml;
@@ -106,6 +109,7 @@ typedef struct {
   int max_steps_per_ms;
   int valve_open;
   int motor_enabled;
+  int hx711_restarts;
 } rig_test_bench_state;
 
 typedef struct rig_test_bench rig_test_bench;

@@ -17,6 +17,7 @@ constexpr double kAdcCounts = 1024.0;
 constexpr double kReference = 5.0;
 constexpr double kGain = 10.0;    // kPa/V
 constexpr double kOffset = 0.5;   // V
+constexpr int kSettlingMs = 300;  // of the HX711 after a restart, beyond one conversion
 constexpr double kSwelling = 0.05;  // s, of the actuator after the pressure
 
 rig_test_bench_state defaults() {
@@ -48,6 +49,7 @@ struct rig_test_bench {
   double swell_ml = 0;
   double frozen_volts = kOffset;
   int word_in_ms = 0;
+  bool was_powered = true;
   std::mt19937 random;
   std::normal_distribution<double> normal;
 
@@ -110,10 +112,22 @@ struct rig_test_bench {
     }
   }
 
-  void weigh(rig_pins_in &in) {
-    if (s.load_cell_period_ms == 0 || ++word_in_ms < s.load_cell_period_ms) return;
+  void weigh(const rig_pins_out &out, rig_pins_in &in) {
+    if (!out.hx711_powered) {
+      if (was_powered) ++s.hx711_restarts;
+      s.hx711_asleep = s.hx711_shifted = 0;
+      word_in_ms = -kSettlingMs;
+    }
+    was_powered = out.hx711_powered != 0;
+    if (s.hx711_line_low) {
+      in.hx711_word = 0;
+      in.hx711_ready = 1;
+      return;
+    }
+    if (s.load_cell_period_ms == 0 || s.hx711_asleep || ++word_in_ms < s.load_cell_period_ms) return;
     word_in_ms = 0;
-    const double counts = std::round(s.load_cell_counts + 50 * normal(random));
+    double counts = std::round(s.load_cell_counts + 50 * normal(random));
+    if (s.hx711_shifted) counts = 2 * counts + 1;
     in.hx711_word = s.hx711_stuck_word ? s.hx711_stuck_word
                                        : static_cast<uint32_t>(static_cast<int32_t>(counts)) & 0xFFFFFFu;
     in.hx711_ready = 1;
@@ -124,7 +138,7 @@ struct rig_test_bench {
     move(out);
     breathe(out.valve_open != 0);
     convert(in);
-    weigh(in);
+    weigh(out, in);
     const double half_step = 0.5e-3 * s.step_ul;
     in.home_switch = s.home_switch_stuck || (!s.home_switch_broken && s.plunger_ml <= half_step);
     in.end_switch = s.plunger_ml >= s.syringe_ml - half_step;

@@ -185,6 +185,7 @@ def _session(setup: Setup, seed: int, logs: Path) -> Session:
         cavity_volume=float(cavity_volume(setup.actuator.geometry, 0.0)),
         created=None if simulated else datetime.now().astimezone().isoformat(timespec="seconds"),
     )
+    request.board_parameters()  # a board would refuse them only once the bench is open
     return Session(request, logs, _RunConsole())
 
 

@@ -11,11 +11,14 @@ import typer
 from rig.cli.app import app
 
 if TYPE_CHECKING:
+    from rig.mechanics.job import Job
     from rig.mechanics.response import Array, Response
     from rig.mechanics.table import Row
     from rig.spec.actuator import ActuatorSpec
+    from rig.spec.material import MaterialSpec
 
 MAX_ROWS = 100_000
+FINITE_ELEMENTS = "fe"
 
 _UNITS = {"kpa": "kPa", "ml": "mL"}
 
@@ -49,6 +52,10 @@ def predict(
         typer.Option(help="START:STOP:STEP of the prescribed angle in deg or volume in mL"),
     ] = None,
     csv: Annotated[Path | None, typer.Option(help="write the table to this file, too")] = None,
+    vtu: Annotated[
+        Path | None,
+        typer.Option(help="write the finite elements' fields to this folder, for ParaView"),
+    ] = None,
 ) -> None:
     """Predict angle, length difference, blocked force and cavity volume of an actuator.
 
@@ -61,6 +68,9 @@ def predict(
 
     Which pressures bend it by 0 to 90 degrees:
     `rig predict --actuator SPEC --control angle --targets 0:90:10`
+
+    Stress and strain at the pressures that were solved for, up to the highest asked for, as
+    files to open in ParaView: `rig predict --actuator SPEC --model fe --vtu fields`
     """
     from rich.console import Console
 
@@ -75,12 +85,17 @@ def predict(
     material = Workspace.find(actuator).material(spec.material)
     grid = _pressure_grid(spec, pressures)
     wanted = _target_grid(control, targets)
+    models = _models(spec, model)
+    if vtu is not None and FINITE_ELEMENTS not in models:
+        raise typer.BadParameter("--vtu writes the fields of finite elements: add --model fe.")
     table, notes = [], []
     with calculating(Console(stderr=True)) as job:
-        for name in _models(spec, model):
+        for name in models:
             response = predict_response(spec, material, name, grid, job)
             table += rows(response if wanted is None else _controlled(response, control, wanted))
             notes += [f"The model {name} is incomplete: {note}" for note in response.notes]
+        if vtu is not None:
+            _write_fields(vtu, spec, material, float(grid[-1]), job)
     _show(spec.name, material.name, table)
     if csv is not None:
         _write(csv, table)
@@ -191,3 +206,13 @@ def _write(path: Path, table: list[Row]) -> None:
             f"the table cannot be written to {path}: {error.strerror}. Name a file in an "
             f"existing folder that you may write to."
         ) from None
+
+
+def _write_fields(
+    folder: Path, spec: ActuatorSpec, material: MaterialSpec, top: float, job: Job
+) -> None:
+    from rig.mechanics.fe.vtu import write_vtu
+    from rig.mechanics.simulate.prediction import free_inflation
+
+    actuator, solutions = free_inflation(spec, material).solutions(top, job)
+    write_vtu(folder, actuator.model, solutions, mirror=actuator.mirror)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from rig.experiment.errors import ExperimentError
+from collections.abc import Mapping
+
+from rig.experiment.errors import ExperimentError, LimitError
 from rig.experiment.plan import TRIP_MARGIN
 from rig.experiment.sweep import reach_top
 from rig.link.client import RigLink
 from rig.link.errors import CommandRefusedError, LinkError
 from rig.link.faults import HINTS
+from rig.link.schema import load_schema
 from rig.spec.actuator import ActuatorSpec
 from rig.spec.bench import BenchSpec
 from rig.spec.calibration import TransducerCalibration
@@ -21,6 +24,26 @@ OFF_HOME_S = 1.0
 """A jog ends by itself after half a second; the rest is for the gas to come to rest."""
 ZERO_TIMEOUT_S = 10.0
 TARE_TIMEOUT_S = 30.0
+
+BENCH_FIELDS: dict[str, str] = {
+    "proportional_ml_s_kpa": "controller.proportional",
+    "integral_ml_s2_kpa": "controller.integral",
+    "feed_forward": "controller.feed_forward",
+    "deadband_kpa": "controller.deadband",
+    "max_flow_ml_s": "controller.max_flow",
+    "max_flow_acceleration_ml_s2": "controller.max_flow_acceleration",
+    "setpoint_rate_kpa_s": "controller.setpoint_rate",
+    "syringe_volume_ml": "syringe.volume",
+    "volume_per_step_ul": "syringe.inner_diameter, lead_screw.lead and stepper.microsteps",
+    "system_volume_ml": "syringe.volume, syringe.dead_volume and tubing.length",
+    "ambient_pressure_kpa": "ambient.pressure",
+    "transducer_gain_kpa_v": "transducer.calibration",
+    "transducer_offset_v": "transducer.calibration",
+    "adc_reference_v": "adc.reference",
+    "pressure_limit_kpa": "safety.pressure and transducer.pressure_high",
+    "communication_timeout_s": "safety.communication_timeout",
+}
+"""Where in the bench spec each parameter of the board comes from."""
 
 
 def board_parameters(
@@ -62,10 +85,33 @@ def board_parameters(
     }
 
 
+def require_board_takes(parameters: Mapping[str, float]) -> None:
+    """Raise LimitError that names every bench field with a value the board would refuse."""
+    rules = load_schema().parameters
+    problems = [
+        f"{BENCH_FIELDS[name]}: it makes the board's {name} {value:g}; the board takes "
+        f"{rules[name].low:g} to {rules[name].high:g}"
+        for name, value in parameters.items()
+        if not rules[name].low <= value <= rules[name].high
+    ]
+    if problems:
+        raise LimitError(
+            "the bench asks for what the board refuses; nothing was moved.\n" + "\n".join(problems)
+        )
+
+
 def write_parameters(link: RigLink, wanted: dict[str, float]) -> dict[str, float]:
-    """Write and read back; returns all parameters in force on the board."""
+    """Write and read back; returns all parameters in force on the board.
+
+    Raises CommandRefusedError that names the parameter and the bench field it comes from.
+    """
     for name, value in wanted.items():
-        link.write_parameter(name, value)
+        try:
+            link.write_parameter(name, value)
+        except CommandRefusedError as error:
+            raise CommandRefusedError(
+                f"{error} In the bench spec it is {BENCH_FIELDS[name]}."
+            ) from error
     return {name: link.read_parameter(name) for name in link.parameter_names}
 
 

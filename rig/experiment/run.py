@@ -16,7 +16,6 @@ from rig.experiment.errors import AbortedError
 from rig.experiment.measure import AngleMeasurement, ForceMeasurement, Measurement
 from rig.experiment.plan import Sweep
 from rig.experiment.prepare import (
-    board_parameters,
     condition,
     leave_home,
     make_ready,
@@ -142,12 +141,8 @@ def _explaining_disk_errors(folder: Path) -> Iterator[None]:
 
 
 def _configure(link: RigLink, request: RunRequest) -> dict[str, float]:
-    setup = request.setup
     take_over(link)
-    wanted = board_parameters(
-        setup.bench, setup.actuator, setup.calibrations.transducer, request.cavity_volume
-    )
-    return write_parameters(link, wanted)
+    return write_parameters(link, request.board_parameters())
 
 
 def _versions(identity: Identity) -> dict[str, str]:

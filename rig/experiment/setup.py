@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rig.experiment.plan import Plan
+from rig.experiment.prepare import board_parameters, require_board_takes
 from rig.spec.workspace import Setup
 
 
@@ -19,3 +20,12 @@ class RunRequest:
     """Of the undeformed actuator in m3, for the controller's feed-forward."""
     created: str | None = None
     """ISO date and time on a real bench; None in simulated time."""
+
+    def board_parameters(self) -> dict[str, float]:
+        """What the board is told before it moves; raises LimitError for what it would refuse."""
+        setup = self.setup
+        parameters = board_parameters(
+            setup.bench, setup.actuator, setup.calibrations.transducer, self.cavity_volume
+        )
+        require_board_takes(parameters)
+        return parameters

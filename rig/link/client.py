@@ -68,6 +68,7 @@ class BoardStatus:
     end_switch: bool
     emergency_stop: bool
     uptime_s: int
+    reset_cause: str
 
 
 @dataclass
@@ -112,10 +113,9 @@ class RigLink:
         self._monitor = e2e.AliveMonitor()
         self._states = self._schema.choices("HEARTBEAT", "state")
         self._faults = self._schema.choices("HEARTBEAT", "fault_code")
+        self._reset_causes = self._schema.choices("HEARTBEAT", "reset_cause")
         self._results = self._schema.choices("HEARTBEAT", "command_result")
         self._opcodes = {n: v for v, n in self._schema.choices("COMMAND", "opcode").items()}
-        indices = self._schema.choices("PARAMETER_REQUEST", "parameter_index")
-        self._parameters = {name: index for index, name in indices.items()}
         self.statistics = LinkStatistics()
         self.identity: Identity | None = None
         self.status: BoardStatus | None = None
@@ -135,7 +135,7 @@ class RigLink:
     @property
     def parameter_names(self) -> tuple[str, ...]:
         """Parameters of the board, in the order of their indices."""
-        return tuple(self._parameters)
+        return tuple(self._schema.parameters)
 
     @property
     def frames_lost(self) -> int:
@@ -202,6 +202,7 @@ class RigLink:
                 end_switch=bool(values["end_switch"]),
                 emergency_stop=bool(values["emergency_stop"]),
                 uptime_s=int(values["uptime_s"]),
+                reset_cause=self._reset_causes.get(int(values["reset_cause"]), "unknown"),
             )
         elif message.name == "FAULT":
             code = self._faults.get(int(values["code"]), "unknown")
@@ -385,7 +386,7 @@ class RigLink:
         }
         request = {
             "operation": operations[operation],
-            "parameter_index": self._parameters[name],
+            "parameter_index": self._schema.parameters[name].index,
             "parameter_value": value,
         }
         answer = self._ask("PARAMETER_REQUEST", "PARAMETER", request, 2.0, numbered=True)
@@ -393,10 +394,16 @@ class RigLink:
         result = results.get(int(answer["parameter_result"]), "unknown")
         if result != "accepted":
             raise CommandRefusedError(
-                f"the board refused to {operation} the parameter {name} = {value:g}: {result}; "
-                "check the matching field of the bench spec."
+                f"the board refused to {operation} the parameter {name} = {value:g}: {result}. "
+                f"{self._parameter_hint(result, name)}"
             )
         return float(answer["parameter_value"])
+
+    def _parameter_hint(self, result: str, name: str) -> str:
+        rule = self._schema.parameters[name]
+        if result == "out_of_range":
+            return f"It takes {rule.low:g} to {rule.high:g} {rule.unit}".rstrip() + "."
+        return "It is written only while the board is idle." if result == "wrong_state" else ""
 
     def _ask(
         self,
@@ -432,6 +439,7 @@ _REFUSAL_HINTS = {
     "out_of_range": "Choose a value within the board's limits (safety section of the bench).",
     "wrong_state": "Wait until the board is idle, or vent first.",
     "not_homed": "Home the plunger first.",
+    "not_zeroed": "Zero the pressure first, with the valve open.",
     "faulted": "Remove the cause, then clear the fault.",
     "busy": "Wait until the running action has ended.",
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from rig.errors import RigError
+from rig.link.faults import VALUE_UNITS
 
 
 class LinkError(RigError):
@@ -37,7 +38,8 @@ class BoardFaultError(LinkError):
         self.value = value
         self.time_s = time_s
         self.hint = hint
-        shown = "" if value is None else f" (value {value:.4g})"
+        unit = VALUE_UNITS.get(code)
+        shown = "" if value is None or unit is None else f" ({value:.4g} {unit})"
         super().__init__(
             f"the board reports the fault '{code}'{shown} at {time_s:.1f} s of bench time and has "
             f"stopped the plunger and vented. {hint}"

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import binascii
 from collections.abc import Mapping
+from dataclasses import dataclass
 from decimal import Decimal
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -15,6 +16,7 @@ from typing import Any
 from rig.link.errors import LinkError
 
 PACKAGE = Path(__file__).resolve().parents[1]
+_READ_AND_WRITE = "DUMMY_NODE_VECTOR3"
 
 
 def schema_path() -> Path:
@@ -28,6 +30,22 @@ def schema_path() -> Path:
     raise LinkError(
         "the link's schema firmware/rig.dbc is missing from this installation; install rig again"
     )
+
+
+@dataclass(frozen=True)
+class ParameterRule:
+    """One parameter of the board, in the unit of its name."""
+
+    index: int
+    name: str
+    unit: str
+    """Empty where the parameter is a plain number."""
+    default: float
+    low: float
+    high: float
+    live: bool
+    """Whether the board takes it while it moves or is under pressure."""
+    meaning: str
 
 
 class Schema:
@@ -79,6 +97,24 @@ class Schema:
         """Names of the values of an enumerated signal."""
         named = self._by_name[message].get_signal_by_name(signal).choices or {}
         return {int(value): str(name) for value, name in named.items()}
+
+    @cached_property
+    def parameters(self) -> dict[str, ParameterRule]:
+        """The board's parameters by name, in the order of their indices."""
+        variables = self._database.dbc.environment_variables.values()
+        return {
+            variable.name: ParameterRule(
+                index=variable.env_id,
+                name=variable.name,
+                unit=variable.unit or "",
+                default=float(variable.initial_value),
+                low=float(variable.minimum),
+                high=float(variable.maximum),
+                live=variable.access_type == _READ_AND_WRITE,
+                meaning=variable.comment,
+            )
+            for variable in sorted(variables, key=lambda v: v.env_id)
+        }
 
     def units(self) -> dict[str, dict[str, str]]:
         """Unit of every signal, by message and signal name; empty text where it has none."""

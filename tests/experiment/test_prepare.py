@@ -2,10 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import pytest
+
 from rig.board.virtual import VirtualBench
-from rig.experiment.prepare import board_parameters, make_ready, take_over, write_parameters
+from rig.experiment.errors import LimitError
+from rig.experiment.prepare import (
+    BENCH_FIELDS,
+    board_parameters,
+    make_ready,
+    take_over,
+    write_parameters,
+)
 from rig.experiment.sweep import go_to, settle
 from rig.link.client import RigLink
+from rig.link.errors import CommandRefusedError
 from rig.spec.protocol import Settling
 
 from .conftest import make_request
@@ -59,3 +71,38 @@ def test_a_fault_is_cleared_even_while_the_plunger_is_still_coming_home() -> Non
     assert link.status is not None
     assert link.status.fault == "none"
     write_parameters(link, parameters)
+
+
+def test_every_parameter_that_is_written_comes_from_fields_of_the_bench() -> None:
+    request = make_request()
+    assert set(BENCH_FIELDS) == set(request.board_parameters())
+    for fields in BENCH_FIELDS.values():
+        for field in fields.replace(" and ", ", ").split(", "):
+            value: object = request.setup.bench
+            for part in field.split("."):
+                value = getattr(value, part)
+
+
+def test_what_the_board_would_refuse_is_refused_before_it_is_asked() -> None:
+    request = make_request()
+    bench = request.setup.bench
+    controller = bench.controller.model_copy(update={"deadband": 5e3})
+    safety = bench.safety.model_copy(update={"communication_timeout": 0.1})
+    wrong = bench.model_copy(update={"controller": controller, "safety": safety})
+    with pytest.raises(LimitError) as caught:
+        replace(request, setup=replace(request.setup, bench=wrong)).board_parameters()
+    said = str(caught.value)
+    assert (
+        "controller.deadband: it makes the board's deadband_kpa 5; the board takes 0 to 1" in said
+    )
+    assert "safety.communication_timeout" in said
+
+
+def test_a_refusal_of_the_board_names_the_field_of_the_bench() -> None:
+    bench, _ = under_pressure()
+    link = RigLink(bench.bus)
+    link.open()
+    with pytest.raises(CommandRefusedError, match=r"syringe_volume_ml.*idle.*syringe\.volume"):
+        write_parameters(link, {"syringe_volume_ml": 50.0})
+    with pytest.raises(CommandRefusedError, match=r"takes 0 to 1 kPa.*controller\.deadband"):
+        write_parameters(link, {"deadband_kpa": 2.0})

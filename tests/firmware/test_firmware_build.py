@@ -10,14 +10,32 @@ import time
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 from board_under_test import PARAMETERS, ROOT
 from rig.board._firmware import ffi, lib
+
+from rig.link.faults import VALUE_UNITS
+from rig.link.schema import load_schema
 
 FIRMWARE = ROOT / "firmware"
 CORE = FIRMWARE / "rig_mega" / "src" / "core"
 ALLOWED_HEADERS = {"stdint.h", "stddef.h", "string.h", "math.h"}
 ARDUINO_CORE = Path("/usr/share/arduino/hardware/arduino/avr/cores/arduino")
+NAME_OF_UNIT = {
+    "": "",
+    "kPa": "_kpa",
+    "kPa/s": "_kpa_s",
+    "kPa/V": "_kpa_v",
+    "mL": "_ml",
+    "mL/s": "_ml_s",
+    "mL/s^2": "_ml_s2",
+    "mL/s/kPa": "_ml_s_kpa",
+    "mL/s^2/kPa": "_ml_s2_kpa",
+    "s": "_s",
+    "uL": "_ul",
+    "V": "_v",
+}
 MICROSECONDS_PER_MILLISECOND = 0.4
 
 
@@ -30,10 +48,10 @@ def generator() -> ModuleType:
     return module
 
 
-def test_the_generated_sources_are_those_of_the_schema() -> None:
-    for name, content in generator().generated_files().items():
-        committed = (CORE / "generated" / name).read_text(encoding="utf-8")
-        assert committed == content, f"{name} is out of date: run python firmware/generate.py"
+def test_what_is_generated_is_that_of_the_schema() -> None:
+    for path, content in generator().generated_files().items():
+        committed = path.read_text(encoding="utf-8")
+        assert committed == content, f"{path} is out of date: run python firmware/generate.py"
 
 
 def test_the_core_includes_nothing_that_a_mega_lacks() -> None:
@@ -48,25 +66,27 @@ def test_the_core_allocates_nothing() -> None:
         assert not re.search(r"\b(new|delete|malloc|free|throw|try|String)\b", code), path
 
 
-def test_the_manual_lists_every_parameter_as_the_firmware_has_it() -> None:
-    manual = (FIRMWARE / "README.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| (\d+) \| `(\w+)` \| (\S+) \| (\S+) \| (\S+) \| (\w+) \|", manual, re.M)
-    assert [row[1] for row in rows] == sorted(PARAMETERS, key=PARAMETERS.__getitem__)
-    for row in rows:
-        index = int(row[0])
-        assert PARAMETERS[row[1]] == index
-        assert float(row[2]) == pytest.approx(lib.rig_host_parameter_default(index))
-        assert float(row[3]) == pytest.approx(lib.rig_host_parameter_min(index))
-        assert float(row[4]) == pytest.approx(lib.rig_host_parameter_max(index))
-        assert (row[5] == "any") == bool(lib.rig_host_parameter_live(index))
+def test_the_firmware_has_the_ranges_that_the_schema_tells_the_host() -> None:
+    parameters = load_schema().parameters
+    assert list(parameters) == sorted(PARAMETERS, key=PARAMETERS.__getitem__)
+    assert len(parameters) == lib.rig_host_parameter_count()
+    for name, rule in parameters.items():
+        index = PARAMETERS[name]
+        assert rule.index == index
+        assert np.float32(rule.default) == lib.rig_host_parameter_default(index)
+        assert np.float32(rule.low) == lib.rig_host_parameter_min(index)
+        assert np.float32(rule.high) == lib.rig_host_parameter_max(index)
+        assert rule.live == bool(lib.rig_host_parameter_live(index))
+        assert name.endswith(NAME_OF_UNIT[rule.unit])
+        assert rule.meaning
 
 
-def test_the_manual_lists_every_fault() -> None:
-    from board_under_test import SCHEMA
-
-    manual = (FIRMWARE / "README.md").read_text(encoding="utf-8")
-    for name in SCHEMA.get_message_by_name("FAULT").get_signal_by_name("code").choices.values():
-        assert str(name) == "none" or f"| `{name}` |" in manual
+def test_the_manual_has_every_fault_with_the_unit_that_the_host_shows() -> None:
+    manual = (ROOT / "docs" / "firmware" / "faults.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(\w+)` \|[^|]*\|[^|]*\| ([^|]*)\|", manual, re.M)
+    names = load_schema().choices("FAULT", "code").values()
+    assert [name for name, _ in rows] == [name for name in names if name != "none"]
+    assert {name: unit.strip() for name, unit in rows if unit.strip()} == VALUE_UNITS
 
 
 @pytest.mark.skipif(shutil.which("avr-g++") is None, reason="avr-g++ is not installed")

@@ -116,3 +116,79 @@ def test_samples_are_counted_one_by_one() -> None:
     board.run(3000)
     samples = [m["load_cell_sample"] for m in board.all("LOAD_CELL")]
     assert samples == list(range(1, 31))
+
+
+# --- restart --------------------------------------------------------------------------------------
+
+
+def load_cell_statuses(board: Board) -> list[str]:
+    return [str(m["load_cell_status"]) for m in board.all("LOAD_CELL")]
+
+
+@pytest.mark.parametrize("timeout_s", [0.9, 1.0, 4.0])
+def test_a_chip_that_fell_asleep_is_restarted_before_it_is_a_fault(timeout_s: float) -> None:
+    board = Board()
+    board.write(hx711_timeout_s=timeout_s)
+    board.at(3.0)
+    board.bench.hx711_asleep = 1
+    board.messages.clear()
+    board.run(int(1000 * timeout_s) + 1000)
+    assert board.bench.hx711_restarts == 1
+    assert load_cell_statuses(board).count("restarted") == 1
+    assert load_cell_statuses(board)[-1] == "ok"
+    assert (board.state, board.fault) == ("run", "none")
+
+
+def test_a_chip_that_lost_its_bits_is_restarted_before_it_is_a_fault() -> None:
+    board = Board().at(3.0)
+    board.bench.hx711_shifted = 1
+    board.messages.clear()
+    board.run(2500)
+    assert load_cell_statuses(board)[:6] == [*["desync"] * 4, "restarted", "ok"]
+    assert board.bench.hx711_restarts == 1
+    assert (board.state, board.fault) == ("run", "none")
+
+
+def test_single_bad_words_restart_nothing() -> None:
+    board = Board().at(3.0)
+    for _ in range(5):
+        board.bench.hx711_stuck_word = 0xFFFFFF
+        board.run(300)
+        board.bench.hx711_stuck_word = 0
+        board.run(300)
+    assert board.bench.hx711_restarts == 0
+
+
+def test_a_lasting_silence_is_a_fault_in_time_and_restarts_slowly_enough_to_end_it() -> None:
+    board = Board().at(3.0)
+    board.bench.load_cell_period_ms = 0
+    board.until("fault", 1200)
+    assert board.fault == "hx711_timeout"
+    board.run(6000)
+    assert 1 + 6.0 / 0.6 - 1 <= board.bench.hx711_restarts <= 1 + 7.0 / 0.6
+    board.bench.load_cell_period_ms = 100
+    board.messages.clear()
+    board.run(1500)
+    assert load_cell_statuses(board)[-1] == "ok"
+
+
+def test_a_load_cell_that_was_never_there_is_not_restarted() -> None:
+    board = Board(conditions={"load_cell_period_ms": 0})
+    board.run(10_000)
+    assert board.bench.hx711_restarts == 0
+
+
+def test_a_data_line_stuck_low_is_a_silent_chip_and_floods_nobody() -> None:
+    board = Board().at(3.0)
+    board.bench.hx711_line_low = 1
+    board.messages.clear()
+    board.run(1300)
+    assert board.fault == "hx711_timeout"
+    assert len(board.all("LOAD_CELL")) < 20
+    assert "ok" not in load_cell_statuses(board)
+
+
+def test_eighty_words_a_second_are_all_taken() -> None:
+    board = Board(conditions={"load_cell_period_ms": 12})
+    board.run(3000)
+    assert load_cell_statuses(board) == ["ok"] * (3000 // 12)

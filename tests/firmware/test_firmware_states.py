@@ -57,6 +57,38 @@ def test_pressure_needs_a_known_home() -> None:
     assert board.state == "idle"
 
 
+def test_pressure_needs_a_known_zero() -> None:
+    board = Board()
+    board.run(200)
+    board.command("home")
+    board.until("idle", 60_000)
+    assert board.command("set_pressure", 1.0) == "not_zeroed"
+    assert board.state == "idle"
+    board.command("zero_pressure")
+    board.run(1100)
+    assert board.command("set_pressure", 1.0) == "accepted"
+
+
+def test_an_offset_beyond_the_limit_lets_nothing_be_regulated() -> None:
+    board = Board(conditions={"offset_kpa": 2.5}).ready()
+    assert board.command("set_pressure", 1.0) == "not_zeroed"
+
+
+@pytest.mark.parametrize("name", ["transducer_offset_v", "adc_reference_v"])
+def test_another_transducer_needs_another_zero_and_the_same_does_not(name: str) -> None:
+    board = Board(conditions={"offset_kpa": 0.8}).ready()
+    value = board.parameter("read", name)["parameter_value"]
+    board.write(**{name: value})
+    assert board.command("set_pressure", 1.0) == "accepted"
+    board.command("vent")
+    board.until("idle", 6000)
+    board.write(**{name: value + 0.01})
+    assert board.command("set_pressure", 1.0) == "not_zeroed"
+    board.write(**{name: value})
+    board.run(200)
+    assert board.last("PRESSURE")["pressure_kpa"] == pytest.approx(0.8, abs=0.03)
+
+
 def test_run_closes_the_valve_and_regulates() -> None:
     board = Board().at(3.0)
     assert board.state == "run"

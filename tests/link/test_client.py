@@ -16,7 +16,7 @@ from rig.link.errors import (
     LinkLostError,
     UnexpectedStateError,
 )
-from rig.link.faults import HINTS
+from rig.link.faults import HINTS, VALUE_UNITS
 from rig.link.schema import load_schema
 from rig.link.slcan import RawFrame
 
@@ -224,6 +224,7 @@ def test_a_latched_fault_raises_with_its_hint(board: ScriptedBoard, link: RigLin
         link.wait(1.0)
     assert caught.value.value == pytest.approx(3.5)
     assert HINTS["leak"] in str(caught.value)
+    assert "(3.5 mL)" in str(caught.value)
 
 
 def test_the_host_heartbeats_at_least_every_300_ms_of_bench_time(
@@ -249,4 +250,5 @@ def test_an_interruption_is_asked_in_every_receive(board: ScriptedBoard) -> None
 def test_every_fault_of_the_schema_has_a_hint() -> None:
     names = set(SCHEMA.choices("HEARTBEAT", "fault_code").values()) - {"none"}
     assert names == set(HINTS)
+    assert set(VALUE_UNITS) <= names
     assert SCHEMA.choices("FAULT", "code") == SCHEMA.choices("HEARTBEAT", "fault_code")

@@ -59,6 +59,16 @@ def test_one_analysis_serves_all_matrices_of_a_pattern_and_only_those() -> None:
         )
 
 
+@pytest.mark.parametrize("shift", [0.1, -3.0])
+def test_threads_share_large_fronts_and_change_not_a_bit(shift) -> None:
+    matrix = _shell(60, 60, 3, shift)
+    right = np.random.default_rng(2).standard_normal(matrix.shape[0])
+    one, two, five = (Multifrontal(n).factorise(matrix).solve(right) for n in (1, 2, 5))
+    np.testing.assert_array_equal(one, two)
+    np.testing.assert_array_equal(one, five)
+    np.testing.assert_allclose(matrix @ one, right, atol=1e-8 * np.abs(one).max())
+
+
 def test_parts_that_do_not_touch_are_solved_side_by_side() -> None:
     part = _shell(20, 6, 3, 0.1)
     matrix = sparse.csc_array(sparse.block_diag((part, 2 * part, part)))

@@ -31,6 +31,8 @@ class Memory:
 
 
 class BendingTube:
+    mirror = 1
+
     def __init__(self) -> None:
         self.model: Model = bending_tube(along=2).model
 
@@ -69,6 +71,11 @@ def test_rungs_are_twelfths_of_the_limit_and_cover_what_was_asked(complete: Memo
 
 def test_a_lower_question_gets_only_what_it_asked_for(complete: Memory) -> None:
     assert question(never).curves(1.5e3, Job(complete)).pressure.size == 3
+
+
+def test_fields_are_those_of_the_rungs_asked_for(complete: Memory) -> None:
+    _, solutions = question().solutions(1.5e3, Job(complete))
+    assert [s.pressure for s in solutions] == pytest.approx([0.0, 1e3, 2e3])
 
 
 def test_a_higher_question_goes_on_where_the_last_one_ended(complete: Memory) -> None:

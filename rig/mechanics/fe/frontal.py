@@ -1,56 +1,41 @@
-"""A multifrontal Cholesky solver for the symmetric systems of soft shells, on BLAS alone.
+"""A multifrontal Cholesky solver for the symmetric systems of soft shells.
 
-SciPy's SuperLU treats every matrix as unsymmetric, works on small supernodes, and repeats its
-analysis every time. Here the analysis is done once per pattern: nested dissection by level sets
-(George, SIAM J. Numer. Anal. 10 (1973) 345; Gibbs, Poole & Stockmeyer, ibid. 13 (1976) 236 for
-the starting points), then each separator or leaf is one dense front (Duff & Reid, ACM Trans.
-Math. Softw. 9 (1983) 302): Cholesky of its pivots, the Schur complement handed to its parent.
+SciPy's SuperLU treats every matrix as unsymmetric, works on small supernodes with one thread, and
+repeats its analysis every time. Here the analysis is done once per pattern: SuperLU's own minimum
+degree ordering (Liu, ACM Trans. Math. Softw. 11 (1985) 141) and fill of the graph of the nodes,
+whose columns are gathered to fronts (Ashcraft & Grimes, ibid. 15 (1989) 291). The numerical part
+is `native/multifrontal.cpp`, with the dense kernels of SciPy's BLAS.
 A front that is not positive definite, as beyond a limit point, is pivoted within (Bunch-Kaufman).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import ctypes
+import functools
+import os
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.linalg import blas, lapack
-from scipy.sparse.csgraph import breadth_first_order
+from scipy.linalg import cython_blas, cython_lapack
+from scipy.sparse.linalg import splu
 
+from rig.mechanics.fe._native import ffi, lib
 from rig.mechanics.fe.discretisation import Integers
 from rig.mechanics.fe.errors import SingularError
 
 Array = NDArray[np.float64]
+Int32s = NDArray[np.int32]
 
-_LEAF = 48
-"""Groups of unknowns (nodes) that are not worth dissecting further."""
-_FAIR, _LOPSIDED = 0.62, 0.92
-"""Share of the larger part that is welcome, and beyond which dissecting stops."""
 _REFINE = 1e-9
 """Relative residual of a solution above which it is refined."""
-
-
-_Run = tuple[int, int, int]
-"""Rows low to high of a child that lie one after the other in its parent, from a third number."""
-
-
-@dataclass(frozen=True)
-class _Front:
-    """One step of the elimination; rows ascend in the order of elimination."""
-
-    pivots: slice
-    """Positions eliminated here."""
-    boundary: Integers
-    """Positions of the rest of the front's rows."""
-    source: tuple[Integers, Integers]
-    """Where in the matrix' data the entries of the pivot and the boundary block come from."""
-    target: tuple[Integers, Integers]
-    """Where in those blocks (column by column) they belong."""
-    children: tuple[int, ...]
-    places: tuple[tuple[_Run, ...], ...]
-    """For each child, where its boundary is among this front's rows."""
+_MAX_THREADS = 4
+"""Threads beyond which the fronts near the root leave nothing to gain."""
+_RATE, _TRAFFIC, _CALL = 15e9, 1e9, 4e-6
+"""Multiplications and moved numbers per second, seconds per front: about those of a core of today.
+They decide which fronts are worth merging, not what comes out."""
 
 
 class Multifrontal:
@@ -58,76 +43,58 @@ class Multifrontal:
 
     name = "multifrontal"
 
-    def __init__(self) -> None:
-        self._indices: NDArray[np.int32] | None = None
-        self._order: Integers = np.zeros(0, dtype=np.int64)
-        self._fronts: list[_Front] = []
+    def __init__(self, threads: int | None = None) -> None:
+        """On `threads` threads, or as many as there are processors, up to four."""
+        self._threads = threads or min(os.cpu_count() or 1, _MAX_THREADS)
+        self._pattern: tuple[Int32s, Int32s] | None = None
+        self._tree: _Tree | None = None
+        self._memory = np.zeros(0)
 
     def factorise(self, matrix: sparse.csc_array) -> MultifrontalFactor:
-        """The factors; raises SingularError."""
-        known = self._indices
-        if known is None or not np.array_equal(known, matrix.indices):
-            self._analyse(matrix)
-        return MultifrontalFactor(self._fronts, self._order, matrix)
-
-    def _analyse(self, matrix: sparse.csc_array) -> None:
-        group, first = _groups(matrix)
-        graph = sparse.csr_array(matrix)[first][:, first]
-        graph = sparse.csr_array(
-            (np.ones(graph.nnz, dtype=np.int8), graph.indices, graph.indptr), shape=graph.shape
-        )
-        tree: list[tuple[Integers, tuple[int, ...]]] = []
-        _dissect(graph, np.arange(graph.shape[0]), tree)
-        # groups in the order of elimination, then unknowns
-        size = np.bincount(group)
-        groups = np.concatenate([own for own, _ in tree])
-        place = np.empty(len(groups), dtype=np.int64)
-        place[groups] = np.arange(len(groups))
-        start = np.concatenate(([0], np.cumsum(size[groups])))
-        self._order = np.argsort(place[group], kind="stable")
-        position = np.empty(len(self._order), dtype=np.int64)
-        position[self._order] = np.arange(len(self._order))
-        self._fronts = _symbolic(matrix, graph, tree, place, start, position)
-        self._indices = matrix.indices.copy()
+        """The factors, in the memory of those before; raises SingularError."""
+        known = self._pattern
+        if (
+            self._tree is None
+            or known is None
+            or not np.array_equal(known[0], matrix.indptr)
+            or not np.array_equal(known[1], matrix.indices)
+        ):
+            self._tree = _analyse(matrix)
+            self._pattern = (matrix.indptr.copy(), matrix.indices.copy())
+            # touching new memory would cost a fifth of the time
+            self._memory = np.empty(self._tree.panel[-1])
+        return MultifrontalFactor(self._tree, matrix, self._memory, self._threads)
 
 
 class MultifrontalFactor:
-    """A factorised matrix."""
+    """A factorised matrix, until the next is factorised."""
 
-    def __init__(self, fronts: Sequence[_Front], order: Integers, matrix: sparse.csc_array) -> None:
-        self._fronts = fronts
-        self._order = order
+    def __init__(self, tree: _Tree, matrix: sparse.csc_array, memory: Array, threads: int) -> None:
+        self._tree = tree
         self._matrix = matrix
-        self._factors: list[_Dense] = []
-        self.negative = False
+        self._factor = memory
+        self._pivoting = np.empty(len(tree.order), dtype=np.int32)
+        self._indefinite = np.empty(len(tree.parent), dtype=np.uint8)
+        data = np.ascontiguousarray(matrix.data, dtype=np.float64)
+        status = lib.multifrontal_factorise(
+            tree.handle,
+            _routines(),
+            threads,
+            _ints(tree.position),
+            _ints(tree.order),
+            _ints(matrix.indptr),
+            _ints(matrix.indices),
+            _reals(data),
+            _reals(self._factor),
+            _ints(self._pivoting),
+            self._indefinite_pointer(),
+        )
+        _check(status, len(tree.order))
+
+    @property
+    def negative(self) -> bool:
         """Whether some front was not positive definite."""
-        data = matrix.data
-        updates: dict[int, Array] = {}
-        for number, front in enumerate(fronts):
-            k, m = front.pivots.stop - front.pivots.start, len(front.boundary)
-            own = np.zeros((k, k), order="F")
-            below = np.zeros((m, k), order="F")
-            rest = np.zeros((m, m), order="F")
-            own.reshape(-1, order="F")[front.target[0]] = data[front.source[0]]
-            below.reshape(-1, order="F")[front.target[1]] = data[front.source[1]]
-            for child, runs in zip(front.children, front.places, strict=True):
-                update = updates.pop(child)
-                for n, (low, high, at) in enumerate(runs):
-                    end = at + high - low
-                    for low_2, high_2, at_2 in runs[n:]:
-                        part = update[low_2:high_2, low:high]
-                        end_2 = at_2 + high_2 - low_2
-                        if at_2 < k:
-                            own[at_2:end_2, at:end] += part
-                        elif at < k:
-                            below[at_2 - k : end_2 - k, at:end] += part
-                        else:
-                            rest[at_2 - k : end_2 - k, at - k : end - k] += part
-            dense = _Dense.of(own, below)
-            self.negative |= dense.pivoting is not None
-            if m:
-                updates[number] = dense.schur(rest)
-            self._factors.append(dense)
+        return bool(self._indefinite.any())
 
     def solve(self, right: Array) -> Array:
         """x with A x = `right`, (n,) or (n, k), refined once if round-off calls for it."""
@@ -140,66 +107,92 @@ class MultifrontalFactor:
         return x.reshape(right.shape)
 
     def _solve(self, columns: Array) -> Array:
-        y = np.asfortranarray(columns[self._order])
-        for front, dense in zip(self._fronts, self._factors, strict=True):
-            y[front.pivots] = dense.forward(y[front.pivots])
-            if len(front.boundary):
-                y[front.boundary] -= dense.down(y[front.pivots])
-        for front, dense in zip(reversed(self._fronts), reversed(self._factors), strict=True):
-            y[front.pivots] = dense.backward(y[front.pivots], y[front.boundary])
-        x = np.empty_like(y)
-        x[self._order] = y
-        return x
+        y = np.asfortranarray(columns[self._tree.order], dtype=np.float64)
+        status = lib.multifrontal_solve(
+            self._tree.handle,
+            _routines(),
+            _reals(self._factor),
+            _ints(self._pivoting),
+            self._indefinite_pointer(),
+            columns.shape[1],
+            _reals(y),
+        )
+        _check(status, len(y))
+        return y[self._tree.position]
+
+    def _indefinite_pointer(self) -> Any:
+        return ffi.cast("uint8_t *", self._indefinite.ctypes.data)
 
 
-@dataclass(frozen=True)
-class _Dense:
-    """The factored pivots of a front and what lies below them."""
+class _Tree:
+    """The elimination tree of fronts, as the native part reads it."""
 
-    own: Array
-    below: Array
-    """L21 if positive definite, otherwise the block as it was."""
-    pivoting: tuple[NDArray[np.int32], Array] | None
-    """Bunch-Kaufman pivots, and own^-1 times the transposed block below."""
+    def __init__(self, order: Int32s, pivots: Int32s, rows: list[Int32s], parent: Int32s) -> None:
+        """`order` has the unknowns by position; front f eliminates `pivots[f]` to
+        `pivots[f + 1]` and leaves `rows[f]` to its `parent[f]`, -1 at a root."""
+        self.order = order
+        self.position = np.empty_like(order)
+        self.position[order] = np.arange(len(order), dtype=np.int32)
+        self.parent = parent
+        counts = np.array([len(r) for r in rows], dtype=np.int64)
+        own = np.diff(pivots).astype(np.int64)
+        self.panel = np.concatenate(([0], np.cumsum(own * (own + counts))))
+        row_start = np.concatenate(([0], np.cumsum(counts)))
+        row = np.concatenate(rows)
+        # the arrays must live as long as the handle that points to them
+        self._kept = (pivots, row_start, row)
+        self.handle = ffi.new(
+            "multifrontal_tree *",
+            {
+                "fronts": len(parent),
+                "size": len(order),
+                "pivot": _ints(pivots),
+                "row_start": _longs(row_start),
+                "row": _ints(row),
+                "parent": _ints(parent),
+                "panel": _longs(self.panel),
+            },
+        )
 
-    @staticmethod
-    def of(own: Array, below: Array) -> _Dense:
-        lower, info = lapack.dpotrf(own, lower=1, clean=1)
-        if info == 0:
-            if len(below):
-                below = blas.dtrsm(1.0, lower, below, side=1, lower=1, trans_a=1, overwrite_b=1)
-            return _Dense(lower, below, None)
-        ldl, pivots, info = lapack.dsytrf(own, lower=1)
-        if info != 0 or not np.all(np.isfinite(ldl)):
-            raise SingularError(
-                "the tangent is singular: some part is not held, or the body is at a limit of "
-                "stability. Check the supports."
-            )
-        across, _ = lapack.dsytrs(ldl, pivots, below.T, lower=1)
-        return _Dense(ldl, below, (pivots, across))
 
-    def schur(self, rest: Array) -> Array:
-        """What the pivots leave to the parent; its lower triangle counts."""
-        if self.pivoting is None:
-            return np.asarray(
-                blas.dsyrk(-1.0, self.below, beta=1.0, c=rest, lower=1, overwrite_c=1)
-            )
-        return rest - self.below @ self.pivoting[1]
+@dataclass
+class _Front:
+    """Unknowns eliminated at once."""
 
-    def forward(self, right: Array) -> Array:
-        if self.pivoting is None:
-            return np.asarray(blas.dtrsm(1.0, self.own, right, lower=1))
-        return np.asarray(lapack.dsytrs(self.own, self.pivoting[0], right, lower=1)[0])
+    columns: list[int]
+    """Their groups, by columns of SuperLU's factor; what the last one's column fills is what the
+    front leaves to its parent."""
+    pivots: int
+    rows: int
+    """Unknowns eliminated and left to the parent."""
 
-    def down(self, solved: Array) -> Array:
-        return self.below @ solved
+    def seconds(self) -> float:
+        """What it takes to assemble and eliminate."""
+        k, m = self.pivots, self.rows
+        return (k**3 / 3 + k * k * m + k * m * m) / _RATE + (k + m) ** 2 / _TRAFFIC + _CALL
 
-    def backward(self, solved: Array, later: Array) -> Array:
-        if self.pivoting is not None:
-            return solved - self.pivoting[1] @ later if len(later) else solved
-        if len(later):
-            solved = solved - self.below.T @ later
-        return np.asarray(blas.dtrsm(1.0, self.own, solved, lower=1, trans_a=1))
+
+def _analyse(matrix: sparse.csc_array) -> _Tree:
+    group, first = _groups(matrix)
+    size = np.bincount(group)
+    order, below = _fill(_between(matrix, first))
+    size = size[order]
+    fronts, parent = _fronts(below, size)
+    # columns of the factor by position: fronts one after the other
+    columns = np.concatenate([np.array(f.columns) for f in fronts])
+    place = np.empty(len(columns), dtype=np.int64)
+    place[columns] = np.arange(len(columns))
+    start = np.concatenate(([0], np.cumsum(size[columns])))
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order[columns]] = np.arange(len(order))
+    ends = np.cumsum([len(f.columns) for f in fronts])
+    pivots = start[np.concatenate(([0], ends))].astype(np.int32)
+    rows = []
+    for front in fronts:
+        last = front.columns[-1]
+        left = below.indices[below.indptr[last] : below.indptr[last + 1]]
+        rows.append(_expanded(np.sort(place[left]), start).astype(np.int32))
+    return _Tree(np.argsort(rank[group], kind="stable").astype(np.int32), pivots, rows, parent)
 
 
 def _groups(matrix: sparse.csc_array) -> tuple[Integers, Integers]:
@@ -215,143 +208,80 @@ def _groups(matrix: sparse.csc_array) -> tuple[Integers, Integers]:
     return group, first
 
 
-def _dissect(
-    graph: sparse.csr_array, nodes: Integers, tree: list[tuple[Integers, tuple[int, ...]]]
-) -> tuple[int, ...]:
-    """Append the fronts of `nodes` to `tree`, children first; the roots appended."""
-    if len(nodes) <= _LEAF:
-        tree.append((nodes, ()))
-        return (len(tree) - 1,)
-    level = _levels(graph)
-    apart = np.flatnonzero(level < 0)
-    if len(apart):
-        roots: tuple[int, ...] = ()
-        for part in (np.flatnonzero(level >= 0), apart):
-            roots += _dissect(graph[part][:, part], nodes[part], tree)
-        return roots
-    cut = _cut(graph, level)
-    if cut is None:
-        tree.append((nodes, ()))
-        return (len(tree) - 1,)
-    below, separator, above = cut
-    children: tuple[int, ...] = ()
-    for part in (below, above):
-        if len(part):
-            children += _dissect(graph[part][:, part], nodes[part], tree)
-    tree.append((nodes[separator], children))
-    return (len(tree) - 1,)
+def _between(matrix: sparse.csc_array, chosen: Integers) -> sparse.csc_array:
+    """The rows and columns `chosen` of a symmetric matrix."""
+    # its columns are its rows
+    rows = sparse.csr_array((matrix.data, matrix.indices, matrix.indptr), shape=matrix.shape)
+    return sparse.csc_array(rows[chosen][:, chosen])
 
 
-def _levels(graph: sparse.csr_array) -> Integers:
-    """Distance of every node from one at the far end; -1 where it cannot be reached."""
-    start = 0
-    for _ in range(3):
-        order, previous = breadth_first_order(graph, start, directed=True)
-        start = int(order[-1])
-    level = np.full(graph.shape[0], -1, dtype=np.int64)
-    level[order[0]] = 0
-    rest = order[1:]
-    while len(rest):
-        known = level[previous[rest]] >= 0
-        # breadth first: the known ones come first
-        count = int(np.argmin(known)) if not known.all() else len(rest)
-        level[rest[:count]] = level[previous[rest[:count]]] + 1
-        rest = rest[count:]
-    return level
-
-
-def _cut(graph: sparse.csr_array, level: Integers) -> tuple[Integers, Integers, Integers] | None:
-    """Nodes below, in and above the best separator between two levels, if there is any."""
-    last = int(level.max())
-    if last < 1:
-        return None
-    columns = graph.indices
-    rows = np.repeat(np.arange(graph.shape[0]), np.diff(graph.indptr))
-    touches = np.zeros(len(level), dtype=bool)
-    touches[rows[level[columns] == level[rows] + 1]] = True
-    width = np.bincount(level[touches], minlength=last + 1)
-    count = np.cumsum(np.bincount(level, minlength=last + 1))
-    below = count[:-1] - width[:-1]
-    above = len(level) - count[:-1]
-    balance = np.maximum(below, above) / len(level)
-    # the smallest separator among those that leave no part much larger than the other
-    fair = balance <= max(_FAIR, float(balance.min()))
-    best = int(np.argmin(np.where(fair, width[:-1], len(level))))
-    if balance[best] > _LOPSIDED:
-        return None
-    inside = touches & (level == best)
-    return (
-        np.flatnonzero((level <= best) & ~inside),
-        np.flatnonzero(inside),
-        np.flatnonzero(level > best),
+def _fill(graph: sparse.csc_array) -> tuple[Integers, sparse.csc_array]:
+    """The order of elimination of a graph, and the rows below the diagonal that each of its
+    columns fills: SuperLU's, of a matrix on that graph that needs no pivoting."""
+    degree = np.diff(graph.indptr)
+    weights = np.full(graph.nnz, -1.0)
+    graph = sparse.csc_array((weights, graph.indices, graph.indptr), shape=graph.shape)
+    dominant = graph + sparse.diags_array(degree + 2.0, format="csc")
+    factor = splu(
+        sparse.csc_matrix(dominant),
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
     )
+    below = sparse.csc_array(sparse.tril(factor.L, -1))
+    below.sort_indices()
+    return np.argsort(factor.perm_c), below
 
 
-def _symbolic(
-    matrix: sparse.csc_array,
-    graph: sparse.csr_array,
-    tree: list[tuple[Integers, tuple[int, ...]]],
-    place: Integers,
-    start: Integers,
-    position: Integers,
-) -> list[_Front]:
-    """The fronts with everything that the numerical phase needs to look up."""
-    ends = np.cumsum([len(own) for own, _ in tree])
-    boundaries: list[Integers] = []
-    for number, (own, children) in enumerate(tree):
-        near = [graph.indices[graph.indptr[g] : graph.indptr[g + 1]] for g in own]
-        reached = [place[np.concatenate(near)]] if near else []
-        reached += [boundaries[c] for c in children]
-        found = np.unique(np.concatenate(reached)) if reached else np.zeros(0, dtype=np.int64)
-        boundaries.append(found[found >= ends[number]])
-    # entries of the lower triangle in the order of elimination, by the front of their column
-    column = np.repeat(position, np.diff(matrix.indptr))
-    row = position[matrix.indices]
-    lower = np.flatnonzero(row >= column)
-    first = start[np.concatenate(([0], ends[:-1]))]
-    owner = np.searchsorted(first, column[lower], side="right") - 1
-    # fronts without pivots share their start with the next one: take the last of equals
-    lower = lower[np.argsort(owner, kind="stable")]
-    limits = np.concatenate(([0], np.cumsum(np.bincount(owner, minlength=len(tree)))))
-    rows_of = [_expanded(b, start) for b in boundaries]
-    fronts = []
-    for number, (_, children) in enumerate(tree):
-        low = int(first[number])
-        high = int(start[ends[number]])
-        boundary = rows_of[number]
-        entries = lower[limits[number] : limits[number + 1]]
-        r, c = row[entries], column[entries] - low
-        inner = r < high
-        outer = ~inner
-        where = np.searchsorted(boundary, r[outer])
-        k = high - low
-        all_rows = np.concatenate((np.arange(low, high), boundary))
-        fronts.append(
-            _Front(
-                pivots=slice(low, high),
-                boundary=boundary,
-                source=(entries[inner], entries[outer]),
-                target=(
-                    (r[inner] - low) + c[inner] * k,
-                    where + c[outer] * len(boundary),
-                ),
-                children=children,
-                places=tuple(
-                    _runs(np.searchsorted(all_rows, rows_of[child]), k) for child in children
-                ),
-            )
-        )
-    return fronts
-
-
-def _runs(places: Integers, pivots: int) -> tuple[_Run, ...]:
-    """Ascending places as runs of consecutive ones, none across the end of the pivots."""
-    if not len(places):
-        return ()
-    breaks = np.flatnonzero((np.diff(places) != 1) | (places[1:] == pivots)) + 1
-    lows = np.concatenate(([0], breaks))
-    highs = np.concatenate((breaks, [len(places)]))
-    return tuple((int(a), int(b), int(places[a])) for a, b in zip(lows, highs, strict=True))
+def _fronts(below: sparse.csc_array, size: Integers) -> tuple[list[_Front], Int32s]:
+    """Fronts and their parents, children first: columns of the factor that share their rows,
+    and children merged with parents wherever that saves time."""
+    count = np.diff(below.indptr)
+    heads = np.full(len(count), -1)
+    filled = count > 0
+    heads[filled] = below.indices[below.indptr[:-1][filled]]
+    rows = np.bincount(
+        np.repeat(np.arange(len(count)), count), size[below.indices], len(count)
+    ).astype(np.int64)
+    # a column continues the front of the one before if that leaves the same rows and itself
+    joined = np.zeros(len(count), dtype=bool)
+    joined[1:] = (heads[:-1] == np.arange(1, len(count))) & (count[:-1] == count[1:] + 1)
+    starts = np.flatnonzero(~joined)
+    owner = np.cumsum(~joined) - 1
+    fronts: list[_Front | None] = []
+    tops = np.append(starts[1:], len(count)) - 1
+    pivots = np.add.reduceat(size, starts)
+    for low, top, own in zip(starts, tops, pivots, strict=True):
+        fronts.append(_Front(list(range(low, top + 1)), int(own), int(rows[top])))
+    parent = [int(owner[heads[top]]) if heads[top] >= 0 else -1 for top in tops]
+    children: list[list[int]] = [[] for _ in fronts]
+    for number, above in enumerate(parent):
+        if above >= 0:
+            children[above].append(number)
+    for number in range(len(fronts)):
+        front = fronts[number]
+        assert front is not None
+        kept: list[int] = []
+        # large children first: they are the ones whose rows the parent shares
+        for child in sorted(children[number], key=lambda c: -fronts[c].rows):  # type: ignore[union-attr]
+            small = fronts[child]
+            assert small is not None
+            both = _Front(small.columns + front.columns, small.pivots + front.pivots, front.rows)
+            if both.seconds() < small.seconds() + front.seconds():
+                front = both
+                fronts[child] = None
+                kept.extend(children[child])
+            else:
+                kept.append(child)
+        fronts[number] = front
+        children[number] = kept
+    alive = [n for n, f in enumerate(fronts) if f is not None]
+    number_of = {n: i for i, n in enumerate(alive)}
+    final = np.full(len(alive), -1, dtype=np.int32)
+    for n in alive:
+        for child in children[n]:
+            final[number_of[child]] = number_of[n]
+    return [f for f in fronts if f is not None], final
 
 
 def _expanded(groups: Integers, start: Integers) -> Integers:
@@ -359,3 +289,51 @@ def _expanded(groups: Integers, start: Integers) -> Integers:
     counts = start[groups + 1] - start[groups]
     offset = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     return np.asarray(np.repeat(start[groups], counts) + offset)
+
+
+@functools.cache
+def _routines() -> Any:
+    """Addresses of SciPy's BLAS and LAPACK, as it publishes them for Cython."""
+    found = {}
+    for module, names in (
+        (cython_blas, ("dtrsm", "dsyrk", "dgemm")),
+        (cython_lapack, ("dpotrf", "dsytrf", "dsytrs")),
+    ):
+        for name in names:
+            capsule = module.__pyx_capi__[name]
+            found[name] = ffi.cast("void *", _address(capsule))
+    return ffi.new("multifrontal_blas *", found)
+
+
+def _address(capsule: object) -> int:
+    api = ctypes.pythonapi
+    api.PyCapsule_GetName.restype = ctypes.c_char_p
+    api.PyCapsule_GetName.argtypes = [ctypes.py_object]
+    api.PyCapsule_GetPointer.restype = ctypes.c_void_p
+    api.PyCapsule_GetPointer.argtypes = [ctypes.py_object, ctypes.c_char_p]
+    return int(api.PyCapsule_GetPointer(capsule, api.PyCapsule_GetName(capsule)))
+
+
+def _check(status: int, unknowns: int) -> None:
+    if status == lib.MULTIFRONTAL_SINGULAR:
+        raise SingularError(
+            "the tangent is singular: some part is not held, or the body is at a limit of "
+            "stability. Check the supports."
+        )
+    if status == lib.MULTIFRONTAL_NO_MEMORY:
+        raise MemoryError(f"the factors of {unknowns} unknowns do not fit into memory")
+
+
+def _ints(array: Int32s) -> Any:
+    assert array.dtype == np.int32
+    return ffi.cast("int32_t *", array.ctypes.data)
+
+
+def _longs(array: Integers) -> Any:
+    assert array.dtype == np.int64
+    return ffi.cast("int64_t *", array.ctypes.data)
+
+
+def _reals(array: Array) -> Any:
+    assert array.dtype == np.float64
+    return ffi.cast("double *", array.ctypes.data)

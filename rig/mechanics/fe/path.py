@@ -6,12 +6,14 @@ succeeds easily lets the next grow. A path that cannot be finished keeps what it
 
 from __future__ import annotations
 
+import functools
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import ThreadpoolController
 
 from rig.mechanics.fe.control import Control, PressureControl, Situation
 from rig.mechanics.fe.linear import LinearSolver, default_solver
@@ -145,15 +147,23 @@ def follow(
     state = start or model.start()
     solutions: list[Solution] = []
     failure = None
-    for index, point in enumerate(points):
-        told = _teller(progress, index, len(points))
-        arrived = run.go(state, point, index, told)
-        if isinstance(arrived, str):
-            failure = arrived
-            break
-        state = arrived.state
-        solutions.append(Solution(state, arrived.assembly.volume, arrived.assembly.residual))
+    with _blas().limit(limits=1, user_api="blas"):
+        for index, point in enumerate(points):
+            told = _teller(progress, index, len(points))
+            arrived = run.go(state, point, index, told)
+            if isinstance(arrived, str):
+                failure = arrived
+                break
+            state = arrived.state
+            solutions.append(Solution(state, arrived.assembly.volume, arrived.assembly.residual))
     return Result(tuple(solutions), tuple(run.history), failure, clock() - begin, run.cancelled)
+
+
+@functools.cache
+def _blas() -> ThreadpoolController:
+    """The BLAS libraries of NumPy and SciPy. Elements and fronts are shared among threads here;
+    more threads inside their small matrices would only fight with these."""
+    return ThreadpoolController()
 
 
 class _Run:

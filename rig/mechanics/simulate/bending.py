@@ -57,6 +57,8 @@ class BendingModel:
     """Of the soft material in kg/m3."""
     acceleration: tuple[float, float, float]
     """Gravity in m/s2."""
+    mirror: int = 1
+    """The plane of symmetry is y = 0."""
 
     def angle(self, state: State) -> float:
         """Bending angle in rad: the end cap against the connector."""

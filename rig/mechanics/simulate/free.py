@@ -32,6 +32,11 @@ class ActuatorModel(Protocol):
         """The model itself; its dead loads act at all rungs."""
         ...
 
+    @property
+    def mirror(self) -> int | None:
+        """Axis across whose plane through the origin the body is mirrored; None if it is whole."""
+        ...
+
     def angle(self, state: State, /) -> float:
         """Bending angle in rad."""
         ...
@@ -82,7 +87,7 @@ class FreeInflation:
     def solutions(self, top: float, job: Job) -> tuple[ActuatorModel, tuple[Solution, ...]]:
         """Model and equilibria up to the rung at or above `top` in Pa: all fields."""
         entry = self._entry(top, job)
-        return self.build(), _solutions(entry)
+        return self.build(), _solutions(entry)[: len(self._rungs(top))]
 
     def _rungs(self, top: float) -> Array:
         step = self.limit / RUNGS

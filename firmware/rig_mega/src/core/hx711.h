@@ -5,7 +5,13 @@
 
 namespace rig {
 
-enum class LoadCellStatus : uint8_t { kOk = 0, kSaturated = 1, kDesync = 2, kTimeout = 3 };
+enum class LoadCellStatus : uint8_t {
+  kOk = 0,
+  kSaturated = 1,
+  kDesync = 2,
+  kTimeout = 3,
+  kRestarted = 4,
+};
 
 // Two's complement of 24 bits to a number.
 int32_t hx711_counts(uint32_t word);
@@ -17,7 +23,8 @@ class Hx711 {
 
   int32_t counts() const { return counts_; }
 
-  // Too many bad words in a row to be chance: the bit clock is out of step.
+  uint8_t bad_in_a_row() const { return bad_in_a_row_; }
+  // Too many bad words in a row to be chance, even after a restart.
   bool desynchronised() const { return bad_in_a_row_ >= kBadWordsToDesync; }
 
   // Begins a new judgement (after a fault was cleared).

@@ -38,7 +38,7 @@ RigCore::RigCore(const BoardInfo &board, const uint8_t *nonvolatile_image) : boa
   boot_finding_ = boot_finding(board.reset_cause, parameters_.load(nonvolatile_image));
   configure();
   pressure_monitor_.reset();
-  outputs_ = {kNoSteps, false, true};
+  outputs_ = {kNoSteps, false, true, true};
 }
 
 void RigCore::configure() {
@@ -62,7 +62,7 @@ void RigCore::sense(const Inputs &inputs) {
   safety_.tick();
   transducer_.sample(inputs.adc_sum, inputs.adc_count);
   if (zeroing_.tick(transducer_.tick_voltage())) {
-    zeroed_ = transducer_.zero(zeroing_.mean(), parameters_.zero_limit());
+    transducer_.zero(zeroing_.mean(), parameters_.zero_limit());
   }
 }
 
@@ -168,6 +168,7 @@ void RigCore::act(const Inputs &inputs) {
   }
   outputs_.steps = outputs_.motor_enabled ? motion_.tick() : kNoSteps;
   outputs_.valve_open = safety_.valve_open();
+  outputs_.load_cell_powered = load_cell_.powered();
 }
 
 void RigCore::regulate() {
@@ -240,7 +241,7 @@ CommandResult RigCore::execute(const Command &command) {
     case Opcode::kHold: enter(State::kHold); break;
     case Opcode::kVent: vent(); break;
     case Opcode::kZeroPressure:
-      zeroed_ = false;
+      transducer_.doubt_zero();
       zeroing_.begin();
       break;
     case Opcode::kTare: load_cell_.begin_tare(); break;
@@ -274,6 +275,7 @@ CommandResult RigCore::set_pressure(float target_kpa) {
   }
   if (!motion_.homed()) return CommandResult::kNotHomed;
   if (zeroing_.active()) return CommandResult::kBusy;
+  if (!transducer_.zeroed()) return CommandResult::kNotZeroed;
   if (safety_.state() != State::kRun) {
     enter(State::kRun);
     loop_.reset();
@@ -339,7 +341,11 @@ bool RigCore::take_save(uint8_t *image) {
 
 // --- telemetry ---------------------------------------------------------------------------------
 
-void RigCore::load_cell_word(uint32_t word) { send_load_cell(load_cell_.accept(word)); }
+void RigCore::load_cell_word(uint32_t word) {
+  const bool credible = load_cell_.due();  // a stuck line would flood the host
+  const LoadCellStatus status = load_cell_.accept(word);
+  if (credible) send_load_cell(status);
+}
 
 void RigCore::report() {
   if (every(kSecondTicks, second_ticks_) && uptime_s_ != 0xFFFF) ++uptime_s_;
@@ -347,6 +353,7 @@ void RigCore::report() {
   if (every(kHeartbeatTicks, heartbeat_ticks_)) send_heartbeat();
   if (every(kControllerTicks, controller_ticks_)) send_controller();
   if (safety_.fault() != Fault::kNone && every(kSecondTicks, fault_report_ticks_)) send_fault();
+  if (!load_cell_.powered()) send_load_cell(LoadCellStatus::kRestarted);
   if (load_cell_.silent(parameters_.hx711_timeout()) &&
       every(kSecondTicks, timeout_report_ticks_)) {
     send_load_cell(LoadCellStatus::kTimeout);
@@ -358,7 +365,7 @@ void RigCore::send_heartbeat() {
       safety_.state(), safety_.fault(), command_number_, command_result_,
       static_cast<uint8_t>(board_.reset_cause), inputs_.home_switch, inputs_.end_switch,
       inputs_.emergency_stop, safety_.valve_open(), outputs_.motor_enabled, motion_.homed(),
-      zeroed_, load_cell_.tared(), uptime_s_}));
+      transducer_.zeroed(), load_cell_.tared(), uptime_s_}));
 }
 
 void RigCore::send_pressure() {

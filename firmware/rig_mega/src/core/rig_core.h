@@ -47,6 +47,7 @@ struct Outputs {
   StepSchedule steps;
   bool motor_enabled;
   bool valve_open;
+  bool load_cell_powered;  // false for one tick restarts the HX711
 };
 
 class RigCore {
@@ -124,7 +125,6 @@ class RigCore {
   uint32_t host_silent_ticks_ = 0;
   uint16_t jog_ticks_ = 0;
   bool retracting_ = false;  // after a fault
-  bool zeroed_ = false;
   bool save_asked_ = false;
 
   uint8_t command_number_ = 0;

@@ -40,6 +40,7 @@ enum class CommandResult : uint8_t {
   kFaulted = RIG_HEARTBEAT_COMMAND_RESULT_FAULTED_CHOICE,
   kBusy = RIG_HEARTBEAT_COMMAND_RESULT_BUSY_CHOICE,
   kNotFinite = RIG_HEARTBEAT_COMMAND_RESULT_NOT_FINITE_CHOICE,
+  kNotZeroed = RIG_HEARTBEAT_COMMAND_RESULT_NOT_ZEROED_CHOICE,
 };
 
 // Whether the state alone allows a command.

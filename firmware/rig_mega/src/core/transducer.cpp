@@ -10,12 +10,21 @@ constexpr float kAdcCounts = 1024;
 // An ADC rounds down: a conversion stands for the middle of its step.
 constexpr float kHalfCount = 0.5f;
 
+bool differ(Voltage a, Voltage b) { return a < b || a > b; }
+
 }  // namespace
 
 void Transducer::configure(const Parameters &parameters) {
   gain_kpa_v_ = parameters.transducer_gain_kpa_v();
-  offset_ = parameters.transducer_offset();
-  volts_per_count_ = to_volts(parameters.adc_reference()) / kAdcCounts;
+  const Voltage offset = parameters.transducer_offset();
+  const Voltage reference = parameters.adc_reference();
+  if (differ(offset, offset_) || differ(reference, reference_)) {
+    shift_ = {};
+    zeroed_ = false;
+  }
+  offset_ = offset;
+  reference_ = reference;
+  volts_per_count_ = to_volts(reference) / kAdcCounts;
   pressure_ = pressure_of(filtered_);
 }
 
@@ -49,6 +58,7 @@ bool Transducer::zero(Voltage at_ambient, Pressure limit) {
   const Voltage shift = at_ambient - offset_;
   if (magnitude(kpa(gain_kpa_v_ * to_volts(shift))) > limit) return false;
   shift_ = shift;
+  zeroed_ = true;
   pressure_ = pressure_of(filtered_);
   return true;
 }

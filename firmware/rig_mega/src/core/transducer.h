@@ -13,6 +13,7 @@ namespace rig {
 
 class Transducer {
  public:
+  // Another offset or reference makes the zero unknown.
   void configure(const Parameters &parameters);
 
   // Takes the conversions of one tick; none at all keeps the last value.
@@ -26,6 +27,9 @@ class Transducer {
 
   // Moves the zero so that `at_ambient` reads 0 kPa; false if that is more than `limit` away.
   bool zero(Voltage at_ambient, Pressure limit);
+  bool zeroed() const { return zeroed_; }
+  // The old zero holds, but no longer counts as known: a new one is on its way.
+  void doubt_zero() { zeroed_ = false; }
 
  private:
   Pressure pressure_of(Voltage voltage) const {
@@ -36,6 +40,7 @@ class Transducer {
   static constexpr uint8_t kRateTicks = 8;
 
   float gain_kpa_v_ = 1;
+  Voltage reference_ = {};
   float volts_per_count_ = 0;
   Voltage offset_ = {};
   Voltage shift_ = {};
@@ -47,6 +52,7 @@ class Transducer {
   uint8_t next_recent_ = 0;
   uint8_t next_history_ = 0;
   bool filled_ = false;
+  bool zeroed_ = false;
 };
 
 }  // namespace rig

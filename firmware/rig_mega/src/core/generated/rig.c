@@ -738,12 +738,12 @@ uint8_t rig_load_cell_load_cell_status_encode(double value)
 
 bool rig_load_cell_load_cell_status_is_in_range(uint8_t value)
 {
-    return (value <= 3u);
+    return (value <= 4u);
 }
 
 bool rig_load_cell_load_cell_status_is_in_phys_range(double value)
 {
-    return ((value >= 0.0) && (value <= 3.0));
+    return ((value >= 0.0) && (value <= 4.0));
 }
 
 int32_t rig_load_cell_load_cell_counts_encode(double value)

@@ -124,6 +124,7 @@ extern "C" {
 #define RIG_HEARTBEAT_COMMAND_RESULT_FAULTED_CHOICE (5u)
 #define RIG_HEARTBEAT_COMMAND_RESULT_BUSY_CHOICE (6u)
 #define RIG_HEARTBEAT_COMMAND_RESULT_NOT_FINITE_CHOICE (7u)
+#define RIG_HEARTBEAT_COMMAND_RESULT_NOT_ZEROED_CHOICE (8u)
 
 #define RIG_HEARTBEAT_RESET_CAUSE_UNKNOWN_CHOICE (0u)
 #define RIG_HEARTBEAT_RESET_CAUSE_POWER_ON_CHOICE (1u)
@@ -135,6 +136,7 @@ extern "C" {
 #define RIG_LOAD_CELL_LOAD_CELL_STATUS_SATURATED_CHOICE (1u)
 #define RIG_LOAD_CELL_LOAD_CELL_STATUS_DESYNC_CHOICE (2u)
 #define RIG_LOAD_CELL_LOAD_CELL_STATUS_TIMEOUT_CHOICE (3u)
+#define RIG_LOAD_CELL_LOAD_CELL_STATUS_RESTARTED_CHOICE (4u)
 
 #define RIG_FAULT_CODE_NONE_CHOICE (0u)
 #define RIG_FAULT_CODE_OVER_PRESSURE_CHOICE (1u)
@@ -535,7 +537,7 @@ struct rig_controller_t {
 /**
  * Signals in message LOAD_CELL.
  *
- * One HX711 conversion, tare removed.
+ * One HX711 conversion, tare removed; or that it fell silent or was restarted.
  *
  * All signal values are as on the CAN bus.
  */
@@ -555,7 +557,7 @@ struct rig_load_cell_t {
     uint8_t alive;
 
     /**
-     * Range: 0..3 (0..3 -)
+     * Range: 0..4 (0..4 -)
      * Scale: 1
      * Offset: 0
      */

@@ -6,6 +6,6 @@
 namespace rig {
 
 constexpr uint8_t kProtocolVersion = 1;
-constexpr uint16_t kSchemaCrc = 0x4FEA;
+constexpr uint16_t kSchemaCrc = 0xC5E2;
 
 }  // namespace rig

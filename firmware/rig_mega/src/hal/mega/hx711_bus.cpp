@@ -42,5 +42,15 @@ uint32_t hx711_read() {
   return word;
 }
 
+void hx711_power(bool on) {
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+    if (on) {
+      PORTC &= static_cast<uint8_t>(~kHx711Clock);
+    } else {
+      PORTC |= kHx711Clock;
+    }
+  }
+}
+
 }  // namespace mega
 }  // namespace rig

@@ -10,6 +10,8 @@ void hx711_begin();
 bool hx711_ready();
 // Only when ready.
 uint32_t hx711_read();
+// Off for 60 us or longer and on again is a restart: channel A, gain 128, bits in step.
+void hx711_power(bool on);
 
 }  // namespace mega
 }  // namespace rig

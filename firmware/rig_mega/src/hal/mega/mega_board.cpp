@@ -39,7 +39,7 @@ void stop_timers() {
 }
 
 void pins_begin() {
-  PORTA = kMotorOff | kValve | kHomeSwitch | kEndSwitch | kEmergencyStop;
+  PORTA = kSafe;
   DDRA = kStep | kDirection | kMotorOff | kValve;
 }
 
@@ -64,6 +64,7 @@ void write_pins(const Outputs &outputs) {
   set_pin(kValve, outputs.valve_open);
   set_pin(kMotorOff, !outputs.motor_enabled);
   plan_steps(outputs.steps);
+  hx711_power(outputs.load_cell_powered);
 }
 
 void exchange_bytes() {
@@ -100,7 +101,9 @@ void step() {
     core().tick(read_pins(sample));
     write_pins(core().outputs());
     wdt_reset();
-    if (hx711_ready()) core().load_cell_word(hx711_read());
+    if (core().outputs().load_cell_powered && hx711_ready()) {
+      core().load_cell_word(hx711_read());
+    }
     if (!store.writing() && core().take_save(store.image())) store.begin_write();
     store.step();
   }

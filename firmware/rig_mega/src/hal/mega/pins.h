@@ -16,6 +16,9 @@ constexpr uint8_t kHomeSwitch = _BV(PA4);   // D26
 constexpr uint8_t kEndSwitch = _BV(PA5);    // D27
 constexpr uint8_t kEmergencyStop = _BV(PA6);  // D28
 
+// Motor off, valve open, pull-ups of the switches on.
+constexpr uint8_t kSafe = kMotorOff | kValve | kHomeSwitch | kEndSwitch | kEmergencyStop;
+
 // Port C, digital pins 30 and 31.
 constexpr uint8_t kHx711Data = _BV(PC7);    // D30
 constexpr uint8_t kHx711Clock = _BV(PC6);   // D31

@@ -1,4 +1,5 @@
-// Why the board started, and the watchdog that restarts it when the main loop hangs.
+// Why the board started, and the watchdog that makes the bench safe and restarts the board when the
+// main loop hangs.
 #pragma once
 
 #include "../../core/rig_core.h"
