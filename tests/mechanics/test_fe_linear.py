@@ -8,11 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import sparse
 
-from rig.mechanics.fe import Point, follow
+from rig.mechanics.fe import Model, Point, Solid, Support, discretise, follow
 from rig.mechanics.fe.errors import SingularError
 from rig.mechanics.fe.frontal import Multifrontal
 from rig.mechanics.fe.linear import SuperLU, default_solver
-from tests.mechanics.fe_problems import bending_tube
+from rig.mechanics.hyperelastic import NeoHookean, QuadraticVolume
+from tests.mechanics.fe_problems import bending_tube, meshes
 
 
 def _shell(nx: int, ny: int, dofs: int, shift: float, seed: int = 0) -> sparse.csc_array:
@@ -42,6 +43,22 @@ def test_solutions_solve_whatever_the_shape_and_the_sign(nx, ny, dofs, shift) ->
     x = Multifrontal().factorise(matrix).solve(right)
     error = np.linalg.norm(matrix @ x - right) / np.linalg.norm(right)
     assert error < 1e-9 * max(1.0, np.abs(x).max())
+
+
+def test_neighbours_with_other_rows_are_kept_apart() -> None:
+    # inner nodes of few hexahedra: many columns of equal length whose rows add up to the same
+    mesh, kinematics = meshes()["hexahedra"]
+    d = discretise(mesh, kinematics)
+    edge = np.unique(d.basis.get_dofs().flatten())
+    model = Model(
+        d,
+        [Solid(d, NeoHookean(1.0), QuadraticVolume(50.0))],
+        supports=[Support.of(d, edge, (0, 1, 2))],
+    )
+    matrix = model.free_matrix(model.assemble(model.start()).data)
+    right = np.ones(matrix.shape[0])
+    x = Multifrontal().factorise(matrix).solve(right)
+    np.testing.assert_allclose(matrix @ x, right, atol=1e-11)
 
 
 def test_it_tells_whether_the_matrix_is_positive_definite() -> None:

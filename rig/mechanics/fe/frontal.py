@@ -197,12 +197,11 @@ def _analyse(matrix: sparse.csc_array) -> _Tree:
 
 def _groups(matrix: sparse.csc_array) -> tuple[Integers, Integers]:
     """Number of the group of each unknown, and the first unknown of each: neighbours in the
-    numbering whose columns look alike, as those of a node do."""
+    numbering whose columns have the same rows, as those of a node do."""
     starts, counts = matrix.indptr[:-1], np.diff(matrix.indptr)
-    index = matrix.indices.astype(np.int64)
-    total = np.add.reduceat(index, starts)
-    mixed = np.add.reduceat((index * 2654435761) % 4294967291, starts)
-    same = (counts[1:] == counts[:-1]) & (total[1:] == total[:-1]) & (mixed[1:] == mixed[:-1])
+    following = np.repeat(counts, counts) + np.arange(matrix.nnz)
+    alike = matrix.indices == matrix.indices[np.minimum(following, matrix.nnz - 1)]
+    same = (counts[1:] == counts[:-1]) & np.logical_and.reduceat(alike, starts)[:-1]
     group = np.concatenate(([0], np.cumsum(~same)))
     first = np.flatnonzero(np.concatenate(([True], ~same)))
     return group, first
