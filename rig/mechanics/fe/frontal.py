@@ -25,6 +25,7 @@ from scipy.sparse.linalg import splu
 from rig.mechanics.fe._native import ffi, lib
 from rig.mechanics.fe.discretisation import Integers
 from rig.mechanics.fe.errors import SingularError
+from rig.mechanics.fe.pointers import flags, ints, longs, reals
 
 Array = NDArray[np.float64]
 Int32s = NDArray[np.int32]
@@ -80,14 +81,14 @@ class MultifrontalFactor:
             tree.handle,
             _routines(),
             threads,
-            _ints(tree.position),
-            _ints(tree.order),
-            _ints(matrix.indptr),
-            _ints(matrix.indices),
-            _reals(data),
-            _reals(self._factor),
-            _ints(self._pivoting),
-            self._indefinite_pointer(),
+            ints(tree.position),
+            ints(tree.order),
+            ints(matrix.indptr),
+            ints(matrix.indices),
+            reals(data),
+            reals(self._factor),
+            ints(self._pivoting),
+            flags(self._indefinite),
         )
         _check(status, len(tree.order))
 
@@ -111,17 +112,14 @@ class MultifrontalFactor:
         status = lib.multifrontal_solve(
             self._tree.handle,
             _routines(),
-            _reals(self._factor),
-            _ints(self._pivoting),
-            self._indefinite_pointer(),
+            reals(self._factor),
+            ints(self._pivoting),
+            flags(self._indefinite),
             columns.shape[1],
-            _reals(y),
+            reals(y),
         )
         _check(status, len(y))
         return y[self._tree.position]
-
-    def _indefinite_pointer(self) -> Any:
-        return ffi.cast("uint8_t *", self._indefinite.ctypes.data)
 
 
 class _Tree:
@@ -146,11 +144,11 @@ class _Tree:
             {
                 "fronts": len(parent),
                 "size": len(order),
-                "pivot": _ints(pivots),
-                "row_start": _longs(row_start),
-                "row": _ints(row),
-                "parent": _ints(parent),
-                "panel": _longs(self.panel),
+                "pivot": ints(pivots),
+                "row_start": longs(row_start),
+                "row": ints(row),
+                "parent": ints(parent),
+                "panel": longs(self.panel),
             },
         )
 
@@ -321,18 +319,3 @@ def _check(status: int, unknowns: int) -> None:
         )
     if status == lib.MULTIFRONTAL_NO_MEMORY:
         raise MemoryError(f"the factors of {unknowns} unknowns do not fit into memory")
-
-
-def _ints(array: Int32s) -> Any:
-    assert array.dtype == np.int32
-    return ffi.cast("int32_t *", array.ctypes.data)
-
-
-def _longs(array: Integers) -> Any:
-    assert array.dtype == np.int64
-    return ffi.cast("int64_t *", array.ctypes.data)
-
-
-def _reals(array: Array) -> Any:
-    assert array.dtype == np.float64
-    return ffi.cast("double *", array.ctypes.data)

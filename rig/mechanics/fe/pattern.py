@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from rig.mechanics.fe._native import lib
 from rig.mechanics.fe.discretisation import Integers
+from rig.mechanics.fe.pointers import ints, reals
 
 Array = NDArray[np.float64]
 
@@ -42,16 +44,32 @@ class Pattern:
             for i in range(width):
                 where = starts[column] + k * width * counts[column] + width * rank + i
                 self.indices[where] = width * coarse.indices + i
+        self._width = width
         coarse.data = np.arange(coarse.nnz, dtype=np.int64)
-        self._positions = [
-            self._place(nodes, coarse, counts, starts, rank, width) for nodes in graph
-        ]
+        first = (starts[column] + width * rank).astype(np.int32)
+        stride = (width * counts).astype(np.int32)
+        self._places = [(first[_address(nodes, coarse)], stride[nodes]) for nodes in graph]
 
     def assemble(self, blocks: Sequence[Array]) -> Array:
         """Sum of the element matrices (elements, dofs, dofs) of each block as column data."""
         data = np.zeros(len(self.indices))
-        for positions, values in zip(self._positions, blocks, strict=True):
-            data += np.bincount(positions, weights=values.reshape(-1), minlength=len(data))
+        for (first, stride), values in zip(self._places, blocks, strict=True):
+            elements, nodes = stride.shape
+            if values.shape != (elements, nodes * self._width, nodes * self._width):
+                raise ValueError(
+                    f"matrices of shape {values.shape} for {elements} elements of {nodes} nodes "
+                    f"with {self._width} unknowns each"
+                )
+            matrices = np.ascontiguousarray(values)
+            lib.elements_scatter(
+                elements,
+                nodes,
+                self._width,
+                ints(first),
+                ints(stride),
+                reals(matrices),
+                reals(data),
+            )
         return data
 
     def matrix(self, data: Array) -> sparse.csc_array:
@@ -62,28 +80,6 @@ class Pattern:
     def submatrix(self, keep: Integers) -> Submatrix:
         """The rows and columns `keep`, which must ascend."""
         return Submatrix(self, keep)
-
-    @staticmethod
-    def _place(
-        nodes: Integers,
-        coarse: sparse.csc_array,
-        counts: Integers,
-        starts: Integers,
-        rank: Integers,
-        width: int,
-    ) -> Integers:
-        elements, a = nodes.shape
-        rows = np.repeat(nodes[:, :, None], a, axis=2)
-        columns = np.repeat(nodes[:, None, :], a, axis=1)
-        # entries are their own addresses: ask the matrix where each is
-        address = np.asarray(coarse[rows.reshape(-1), columns.reshape(-1)]).reshape(-1)
-        column = columns.reshape(-1)
-        base = starts[column] + width * rank[address]
-        stride = width * counts[column]
-        i = np.arange(width)
-        full = base[:, None, None] + i[:, None] + stride[:, None, None] * i[None, :]
-        full = full.reshape(elements, a, a, width, width).transpose(0, 1, 3, 2, 4)
-        return np.ascontiguousarray(full).reshape(-1)
 
 
 class Submatrix:
@@ -104,6 +100,16 @@ class Submatrix:
         """The submatrix of the matrix with these data."""
         shape = (self.size, self.size)
         return sparse.csc_array((data[self._source], self.indices, self.indptr), shape=shape)
+
+
+def _address(nodes: Integers, coarse: sparse.csc_array) -> Integers:
+    """Which entry of the graph each pair of an element's nodes is, (elements, a, a)."""
+    a = nodes.shape[1]
+    rows = np.repeat(nodes[:, :, None], a, axis=2)
+    columns = np.repeat(nodes[:, None, :], a, axis=1)
+    # entries are their own addresses: ask the matrix where each is
+    found = coarse[rows.reshape(-1), columns.reshape(-1)]
+    return np.asarray(found).reshape(rows.shape)
 
 
 def _is_by_node(dofs: Integers, dim: int) -> bool:

@@ -26,7 +26,9 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.mechanics.fe._native import ffi, lib
 from rig.mechanics.fe.discretisation import Discretisation, Integers
+from rig.mechanics.fe.pointers import reals
 from rig.mechanics.fe.state import PointState
 from rig.mechanics.hyperelastic import Energy, Hyperelastic, Volumetric
 from rig.mechanics.hyperelastic.tensors import (
@@ -199,7 +201,9 @@ class Solid:
                 residual[chunk, n_u:] = r_p
                 if stiffness is not None:
                     block = stiffness[chunk]
-                    self._stiffness(at.tangent, w, chunk, block[:, :n_u, :n_u])
+                    none = np.zeros((len(w), 0, n_u))
+                    dyads = (none.swapaxes(1, 2), none)
+                    self._stiffness(at.tangent, w, chunk, dyads, block[:, :n_u, :n_u])
                     block[:, :n_u, n_u:] = coupling
                     block[:, n_u:, :n_u] = coupling.swapaxes(1, 2)
                     block[:, n_u:, n_u:] = -bulk
@@ -208,9 +212,8 @@ class Solid:
                 solved = np.linalg.solve(bulk, right)
                 residual[chunk] = r_u + (coupling @ solved[:, :, :1])[..., 0]
                 if stiffness is not None:
-                    block = stiffness[chunk]
-                    self._stiffness(at.tangent, w, chunk, block)
-                    block += coupling @ solved[:, :, 1:]
+                    dyads = (coupling, solved[:, :, 1:])
+                    self._stiffness(at.tangent, w, chunk, dyads, stiffness[chunk])
                     delta_p[chunk] = solved[:, :, 0]
                     slope_p[chunk] = solved[:, :, 1:]
             store.put(chunk, n_points, f, at)
@@ -342,20 +345,37 @@ class Solid:
             result[:, :, i] = flat.swapaxes(1, 2) @ s.reshape(*flat.shape[:2], phi.shape[2])
         return result.reshape(len(w), self._u_dofs.shape[1], phi.shape[2])
 
-    def _stiffness(self, slope: Array | None, w: Array, chunk: slice, out: Array) -> None:
+    def _stiffness(
+        self, slope: Array | None, w: Array, chunk: slice, dyads: tuple[Array, Array], out: Array
+    ) -> None:
+        """B^T A B and the product of `dyads`, (elements, dofs, m) and (elements, m, dofs), which
+        must be symmetric."""
         assert slope is not None
-        weighted = slope.reshape(9, 9, *w.shape) * w
-        for i, rows in enumerate(self._components):
-            left = self._gradients[i][chunk]
-            left = left.reshape(len(left), -1, left.shape[3]).swapaxes(1, 2)
-            for k in range(i, self._dim):
-                columns = self._components[k]
-                a = np.moveaxis(weighted[np.ix_(rows, columns)], (0, 1), (2, 3))
-                right = np.matmul(np.ascontiguousarray(a), self._gradients[k][chunk])
-                part = left @ right.reshape(len(w), -1, right.shape[3])
-                out[:, i :: self._dim, k :: self._dim] = part
-                if k > i:
-                    out[:, k :: self._dim, i :: self._dim] = part.swapaxes(1, 2)
+        gradients = [g[chunk] for g in self._gradients]
+        left, right = (np.ascontiguousarray(part) for part in dyads)
+        entry = np.zeros((3, 3), dtype=np.int32)
+        for component, entries in enumerate(self._components):
+            entry[component, : len(entries)] = entries
+        given = ffi.new(
+            "element_matrices *",
+            {
+                "elements": len(w),
+                "points": w.shape[1],
+                "nodes": gradients[0].shape[3],
+                "dim": self._dim,
+                "modes": left.shape[2],
+                "entries": [len(entries) for entries in self._components],
+                "entry": entry.reshape(-1).tolist(),
+                "gradient": [reals(g) for g in gradients],
+                "weight": reals(w),
+                "slope": reals(slope),
+                "left": reals(left),
+                "right": reals(right),
+            },
+        )
+        strides = (step // out.itemsize for step in out.strides[:2])
+        if not lib.elements_stiffness(given, reals(out), *strides):
+            raise MemoryError(f"no room for the matrices of {len(w)} elements")
 
 
 @dataclass(frozen=True)

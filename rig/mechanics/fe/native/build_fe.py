@@ -9,7 +9,7 @@ from cffi import FFI
 
 ROOT = Path(__file__).resolve().parents[4]
 FOLDER = "rig/mechanics/fe/native"
-PARTS = ("multifrontal",)
+PARTS = ("elements", "multifrontal")
 
 
 def declarations(header: Path) -> str:
@@ -27,7 +27,7 @@ ffibuilder.set_source(
     source_extension=".cpp",
     sources=[f"{FOLDER}/{part}.cpp" for part in PARTS],
     include_dirs=[FOLDER],
-    depends=[f"{FOLDER}/{part}.h" for part in PARTS],
+    depends=[f"{FOLDER}/{part}.h" for part in PARTS] + [f"{FOLDER}/stiffness.inc"],
     extra_compile_args=["-std=c++17", "-O3", "-Wall", "-Wextra", "-pthread"],
     extra_link_args=["-pthread"],
 )
