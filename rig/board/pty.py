@@ -1,4 +1,4 @@
-"""The virtual board on a pseudo-terminal, in real time: a serial port without hardware.
+"""A simulated board on a pseudo-terminal, in real time: a serial port without hardware.
 
 Any SLCAN program can open it; here wall time is the point, so it is read at this edge.
 """
@@ -13,7 +13,7 @@ import time
 import tty
 from collections.abc import Callable
 
-from rig.board.native import NativeBoard
+from rig.board.simulated import SimulatedBoard
 
 SLICE_S = 0.005
 """How often bytes move, in wall time."""
@@ -22,7 +22,7 @@ SLICE_S = 0.005
 class PtyServer:
     """Serves a board at `port` until told to stop."""
 
-    def __init__(self, board: NativeBoard) -> None:
+    def __init__(self, board: SimulatedBoard) -> None:
         self._board = board
         self._master, self._slave = pty.openpty()
         tty.setraw(self._slave)

@@ -1,10 +1,11 @@
-"""The virtual bench: native firmware, simulated plant and rendered camera, behind real interfaces.
+"""The virtual bench: a simulated board, plant and camera, behind real interfaces.
 
 Experiments get a bus and a camera. The truth goes to a file of its own.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -14,13 +15,14 @@ import numpy as np
 from rig.board.errors import BoardError
 from rig.board.native import NativeBoard
 from rig.board.revision import firmware_revision
+from rig.board.simulated import SimulatedBoard
 from rig.board.truth import TruthFile
 from rig.link.bus import SlcanBus
 from rig.mechanics.profile import side_profile
 from rig.plant.camera import CameraFault, VirtualCamera
 from rig.plant.plant import Fixture, HiddenErrors, Plant, plant_parameters
 from rig.plant.specimen import Specimen, draw_specimen
-from rig.spec.bench import BenchSpec
+from rig.spec.bench import BenchSpec, EmulatedBoard
 from rig.spec.bench import VirtualBench as VirtualBenchSpec
 from rig.spec.workspace import Setup
 
@@ -43,7 +45,7 @@ class _Seeds:
 def _virtual(bench: BenchSpec) -> VirtualBenchSpec:
     if bench.virtual is None:
         raise BoardError(
-            f"the bench '{bench.name}' has a virtual board but no section 'virtual', which holds "
+            f"the bench '{bench.name}' has a simulated board but no section 'virtual', which holds "
             "the imperfections of the simulated bench; copy the one of "
             "models/benches/virtual.yaml."
         )
@@ -80,11 +82,25 @@ def _plant(setup: Setup, specimen: Specimen, seeds: _Seeds) -> Plant:
     return Plant(parameters, specimen, int(seeds.noise.generate_state(1, np.uint64)[0]))
 
 
-def virtual_board(setup: Setup, seed: int) -> NativeBoard:
-    """The native firmware on a simulated bench, without camera and truth file."""
+def virtual_board(setup: Setup, seed: int) -> SimulatedBoard:
+    """The board that the bench spec names on a simulated bench, without camera and truth file."""
     seeds = _Seeds.of(seed, 0)
-    plant = _plant(setup, _specimen(setup, seeds), seeds)
-    return NativeBoard(plant, firmware_git=firmware_revision())
+    return _board(setup.bench, _plant(setup, _specimen(setup, seeds), seeds))
+
+
+def _board(
+    bench: BenchSpec,
+    plant: Plant,
+    start_s: float = 0.0,
+    after_poll: Callable[[], None] | None = None,
+) -> SimulatedBoard:
+    if isinstance(bench.board, EmulatedBoard):
+        from rig.board.emulated import EmulatedBoard as Mega  # built on first use
+
+        return Mega(plant, start_s=start_s, after_poll=after_poll)
+    return NativeBoard(
+        plant, firmware_git=firmware_revision(), start_s=start_s, after_poll=after_poll
+    )
 
 
 class PlantCamera:
@@ -99,7 +115,7 @@ class PlantCamera:
     def fault(self, fault: CameraFault) -> None:
         self._camera.fault = fault
 
-    def __init__(self, camera: VirtualCamera, plant: Plant, board: NativeBoard) -> None:
+    def __init__(self, camera: VirtualCamera, plant: Plant, board: SimulatedBoard) -> None:
         self._camera = camera
         self._plant = plant
         self._board = board
@@ -130,12 +146,7 @@ class VirtualBench:
         specimen = _specimen(setup, seeds)
         self.plant = _plant(setup, specimen, seeds)
         self._truth = TruthFile(truth_path) if truth_path is not None else None
-        self._board = NativeBoard(
-            self.plant,
-            firmware_git=firmware_revision(),
-            start_s=start_s,
-            after_poll=self._write_truth,
-        )
+        self._board = _board(setup.bench, self.plant, start_s, self._write_truth)
         self.bus = SlcanBus(self._board)
         camera = VirtualCamera(
             setup.calibrations.camera,
@@ -147,6 +158,11 @@ class VirtualBench:
             side_profile,
         )
         self.camera = PlantCamera(camera, self.plant, self._board)
+
+    @property
+    def board(self) -> SimulatedBoard:
+        """The board itself, for those who break or measure it."""
+        return self._board
 
     def mount(self, fixture: Literal["free", "blocked"]) -> None:
         """Free the tip or block it against the load cell."""

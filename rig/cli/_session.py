@@ -26,7 +26,6 @@ from rig.experiment.setup import RunRequest
 from rig.mechanics.profile import cavity_volume
 from rig.record.reader import RunReader
 from rig.record.writer import require_free_folder
-from rig.spec.bench import VirtualBoard
 from rig.spec.workspace import Setup, Workspace
 
 
@@ -112,7 +111,7 @@ class Session:
 
     def _open(self, folder: Path, *, segment: int, start_s: float) -> Bench:
         setup = self.request.setup
-        if isinstance(setup.bench.board, VirtualBoard):
+        if setup.bench.simulated:
             return VirtualBench(
                 setup,
                 self.request.seed,
@@ -177,13 +176,14 @@ def resumed_session(run: Path) -> Session:
 
 
 def _session(setup: Setup, seed: int, logs: Path) -> Session:
-    simulated = isinstance(setup.bench.board, VirtualBoard)
     request = RunRequest(
         setup=setup,
         plan=make_plan(setup.protocol, setup.actuator, setup.bench),
         seed=seed,
         cavity_volume=float(cavity_volume(setup.actuator.geometry, 0.0)),
-        created=None if simulated else datetime.now().astimezone().isoformat(timespec="seconds"),
+        created=None
+        if setup.bench.simulated
+        else datetime.now().astimezone().isoformat(timespec="seconds"),
     )
     request.board_parameters()  # a board would refuse them only once the bench is open
     return Session(request, logs, _RunConsole())

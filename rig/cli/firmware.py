@@ -18,13 +18,18 @@ def serve(
     actuator: Annotated[
         str, typer.Option(help="Actuator on the simulated bench: a name or a file.")
     ] = "bellow-bending",
-    bench: Annotated[str, typer.Option(help="Virtual bench: a name or a file.")] = "virtual",
+    bench: Annotated[
+        str, typer.Option(help="`virtual`, `emulated`, or a file of a simulated bench.")
+    ] = "virtual",
     seed: Annotated[int, typer.Option(min=0, help="Of the simulated bench.")] = 1,
     link: Annotated[
         Path | None, typer.Option(help="Also make this symbolic link to the port.")
     ] = None,
 ) -> None:
-    """Run the native firmware with a simulated bench on a serial port, in real time.
+    """Run the firmware with a simulated bench on a serial port, in real time.
+
+    On the bench `virtual` that is the firmware compiled for this machine; on `emulated`, the
+    image of the Mega.
 
     Every SLCAN program can talk to it. Ctrl-C ends it.
 

@@ -36,6 +36,12 @@ class VirtualBoard(SpecModel):
     kind: Literal["virtual"]
 
 
+class EmulatedBoard(SpecModel):
+    """The image of the Mega, emulated, on the simulated bench; needs some Debian packages."""
+
+    kind: Literal["emulated"]
+
+
 class SerialBoard(SpecModel):
     """An Arduino Mega on a serial port, or any pyserial URL."""
 
@@ -227,7 +233,7 @@ class BenchSpec(SpecModel):
     kind: Literal["bench"]
     name: Name
     description: str = ""
-    board: Annotated[VirtualBoard | SerialBoard, Field(discriminator="kind")]
+    board: Annotated[VirtualBoard | EmulatedBoard | SerialBoard, Field(discriminator="kind")]
     syringe: Syringe
     stepper: Stepper
     lead_screw: LeadScrew
@@ -242,6 +248,11 @@ class BenchSpec(SpecModel):
     virtual: VirtualBench | None = None
 
     @property
+    def simulated(self) -> bool:
+        """Whether board, plant and camera are simulated."""
+        return not isinstance(self.board, SerialBoard)
+
+    @property
     def volume_per_step(self) -> float:
         """Volume in m3 that one step pulse sweeps."""
         pulses = self.stepper.steps_per_revolution * self.stepper.microsteps
@@ -249,7 +260,6 @@ class BenchSpec(SpecModel):
 
     @model_validator(mode="after")
     def _parts_fit_together(self) -> BenchSpec:
-        is_virtual = isinstance(self.board, VirtualBoard)
         problems = []
         if self.safety.pressure > self.transducer.pressure_high:
             problems.append(
@@ -262,12 +272,15 @@ class BenchSpec(SpecModel):
                 f"transducer.voltage_high is {self.transducer.voltage_high:g} V, beyond what the "
                 f"converter can see; expected at most adc.reference, {self.adc.reference:g} V"
             )
-        if is_virtual and self.virtual is None:
-            problems.append("a virtual board needs the section 'virtual'; see models/benches")
-        if is_virtual != isinstance(self.camera.device, VirtualCameraDevice):
+        if self.simulated and self.virtual is None:
+            problems.append(
+                f"a board of kind '{self.board.kind}' needs the section 'virtual'; see "
+                "models/benches"
+            )
+        if self.simulated != isinstance(self.camera.device, VirtualCameraDevice):
             problems.append(
                 f"board.kind is '{self.board.kind}' but camera.device.kind is "
-                f"'{self.camera.device.kind}'; expected both virtual or both real"
+                f"'{self.camera.device.kind}'; expected both simulated or both real"
             )
         require(not problems, "; ".join(problems))
         return self

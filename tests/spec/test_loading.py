@@ -116,9 +116,9 @@ def test_a_shipped_spec_survives_json(path: Path) -> None:
          "window is 60 s, timeout 60 s; expected window below timeout"),
         (BENCH, "0.8\n", ".inf\n", "0.8", "virtual.optics.blur", "expected a number, at least 0"),
         (BENCH, "board: {kind: virtual}", "board: {kind: vrtual}", "virtual}", "board.kind",
-         "did you mean 'virtual'? expected one of 'virtual', 'serial'"),
+         "did you mean 'virtual'? expected one of 'virtual', 'emulated', 'serial'"),
         (BENCH, "board: {kind: virtual}", "board: {}", "{kind", "board.kind",
-         "required, but missing; expected one of 'virtual', 'serial'"),
+         "required, but missing; expected one of 'virtual', 'emulated', 'serial'"),
         (BENCH, "23 degC", "-300 degC", "23 degC", "ambient.temperature", "above -273.15 degC"),
         (BENCH, "device: {kind: virtual}", "device: {kind: opencv, source: [1]}", None,
          "camera.device.source", "expected a whole number or text"),
@@ -215,7 +215,7 @@ def test_parts_of_a_bench_must_fit_together() -> None:
     (problem,) = complaints(text)
     assert "safety.pressure is 50 kPa, beyond what the transducer can see" in problem
     assert "transducer.voltage_high is 4.5 V, beyond what the converter can see" in problem
-    assert "expected both virtual or both real" in problem
+    assert "expected both simulated or both real" in problem
 
 
 def test_a_protocol_without_experiments_is_refused() -> None:
