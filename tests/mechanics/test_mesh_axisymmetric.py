@@ -11,6 +11,7 @@ from conftest import SHARED_DATA
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rig.mechanics.fe import Kinematics, PressureSurface, discretise
 from rig.mechanics.mesh.bellow_axisymmetric import (
     AxisymmetricBellow,
     AxisymmetricResolution,
@@ -115,3 +116,13 @@ def test_impossible_bellows_are_refused_with_a_reason():
         AxisymmetricBellow(wall=0.025)
     with pytest.raises(BellowShapeError, match="at least one bellow"):
         AxisymmetricBellow(layers=0)
+
+
+@pytest.mark.parametrize("along", [3, 6])
+def test_facets_are_integrated_where_they_meet_at_no_angle(along: int):
+    """Newton's method finds further points outside the element with the same image there."""
+    shape = AxisymmetricBellow(wall=0.0045, layers=3, divided_ratio=2.0)
+    mesh = mesh_axisymmetric_bellow(shape, AxisymmetricResolution(half_arc=along)).mesh
+    d = discretise(mesh, Kinematics.AXISYMMETRIC)
+    surface = PressureSurface(d, d.facets_on("cavity"))
+    assert surface.rest_volume == pytest.approx(shape.cavity_volume, rel=1e-4)
