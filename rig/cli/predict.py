@@ -56,6 +56,10 @@ def predict(
         Path | None,
         typer.Option(help="write the finite elements' fields to this folder, for ParaView"),
     ] = None,
+    view: Annotated[
+        Path | None,
+        typer.Option(help="write a page with a 3D view of stress and strain to this HTML file"),
+    ] = None,
 ) -> None:
     """Predict angle, length difference, blocked force and cavity volume of an actuator.
 
@@ -70,7 +74,8 @@ def predict(
     `rig predict --actuator SPEC --control angle --targets 0:90:10`
 
     Stress and strain at the pressures that were solved for, up to the highest asked for, as
-    files to open in ParaView: `rig predict --actuator SPEC --model fe --vtu fields`
+    files to open in ParaView and as a page to turn in a browser:
+    `rig predict --actuator SPEC --model fe --vtu fields --view fields.html`
     """
     from rich.console import Console
 
@@ -86,8 +91,10 @@ def predict(
     grid = _pressure_grid(spec, pressures)
     wanted = _target_grid(control, targets)
     models = _models(spec, model)
-    if vtu is not None and FINITE_ELEMENTS not in models:
-        raise typer.BadParameter("--vtu writes the fields of finite elements: add --model fe.")
+    if (vtu is not None or view is not None) and FINITE_ELEMENTS not in models:
+        raise typer.BadParameter(
+            "--vtu and --view show the fields of finite elements: add --model fe."
+        )
     table, notes = [], []
     with calculating(Console(stderr=True)) as job:
         for name in models:
@@ -96,6 +103,8 @@ def predict(
             notes += [f"The model {name} is incomplete: {note}" for note in response.notes]
         if vtu is not None:
             _write_fields(vtu, spec, material, float(grid[-1]), job)
+        if view is not None:
+            _write_view(view, spec, material, float(grid[-1]), job)
     _show(spec.name, material.name, table)
     if csv is not None:
         _write(csv, table)
@@ -216,3 +225,23 @@ def _write_fields(
 
     actuator, solutions = free_inflation(spec, material).solutions(top, job)
     write_vtu(folder, actuator.model, solutions, mirror=actuator.mirror)
+
+
+def _write_view(
+    path: Path, spec: ActuatorSpec, material: MaterialSpec, top: float, job: Job
+) -> None:
+    from rig.report.build import write_text
+    from rig.report.errors import ReportError
+    from rig.report.page import render_strength
+    from rig.report.strength import strength_section
+
+    page = render_strength(
+        strength_section(spec, material, top, job), f"{spec.name}, {material.name}"
+    )
+    try:
+        write_text(path, page)
+    except OSError as error:
+        raise ReportError(
+            f"the view cannot be written to {path}: {error.strerror}. Name a file in an existing "
+            f"folder that you may write to."
+        ) from None

@@ -12,7 +12,7 @@ import json
 import os
 import tempfile
 import zipfile
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Protocol
@@ -48,6 +48,25 @@ class NoStore:
 
     def save(self, _key: str, _entry: Entry) -> None:
         """Forget it at once."""
+
+
+@dataclass(frozen=True)
+class Remembering:
+    """Another store, whose entries are kept in memory, too: good for several questions in a row."""
+
+    store: Store
+    known: dict[str, Entry] = field(default_factory=dict)
+
+    def load(self, key: str) -> Entry | None:
+        """The entry of a key, if there is one."""
+        if key not in self.known and (found := self.store.load(key)) is not None:
+            self.known[key] = found
+        return self.known.get(key)
+
+    def save(self, key: str, entry: Entry) -> None:
+        """Keep an entry in both."""
+        self.known[key] = entry
+        self.store.save(key, entry)
 
 
 @dataclass(frozen=True)

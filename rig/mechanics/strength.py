@@ -19,9 +19,12 @@ from rig.spec.material import MaterialSpec
 class Criterion(StrEnum):
     """What is compared with what."""
 
-    NOMINAL_STRESS = "principal nominal stress against tensile strength"
-    ENGINEERING_STRAIN = "principal engineering strain against elongation at break"
-    TRUE_STRESS = "von Mises stress against true stress at break"
+    NOMINAL_STRESS = "nominal stress"
+    """Largest principal nominal stress against tensile strength."""
+    ENGINEERING_STRAIN = "engineering strain"
+    """Largest engineering principal strain against elongation at break."""
+    TRUE_STRESS = "true stress"
+    """Largest von Mises stress against the true stress at break."""
 
 
 @dataclass(frozen=True)

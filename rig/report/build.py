@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +12,14 @@ from rig.mechanics.errors import MechanicsError
 from rig.mechanics.job import Job
 from rig.mechanics.model import predict
 from rig.mechanics.response import Response
+from rig.mechanics.store import Remembering
 from rig.record.reader import RunReader
 from rig.record.tables import write_tables
 from rig.report.analysis import summarise
 from rig.report.data import RunData, load_run
 from rig.report.errors import ReportError
 from rig.report.page import render_report
+from rig.report.strength import StrengthSection, strength_section
 from rig.report.summary import RunSummary
 from rig.spec.published import PublishedReference
 from rig.spec.workspace import Workspace, library_root
@@ -25,6 +27,7 @@ from rig.spec.workspace import Workspace, library_root
 SUMMARY_FILE = "summary.json"
 REPORT_FILE = "report.html"
 CURVE_POINTS = 101
+FINITE_ELEMENTS = "fe"
 
 
 @dataclass(frozen=True)
@@ -56,8 +59,12 @@ def build_report(
     that does not hold a run, ReportError if the folder cannot be written.
     """
     reader = reader or RunReader(folder)
+    job = job or Job()
+    # what was predicted is asked for again for its stresses: without a cache, too
+    job = replace(job, store=Remembering(job.store))
     analysis = analyse(reader, job)
-    page = render_report(analysis.data, analysis.summary, analysis.predictions)
+    strength = _strength(analysis, job)
+    page = render_report(analysis.data, analysis.summary, analysis.predictions, strength)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         write_tables(reader, folder)
@@ -81,10 +88,7 @@ def write_text(path: Path, text: str) -> None:
 def _predictions(data: RunData, job: Job) -> tuple[dict[str, Response], list[str]]:
     """The models' responses over the pressures of the run, and why some are missing."""
     actuator, material = data.setup.actuator, data.setup.material
-    sections = [data.setup.protocol.deformation, data.setup.protocol.blocked_force]
-    asked = max((s.pressures.stop for s in sections if s is not None), default=0.0)
-    top = min(max(asked, data.highest_kpa * 1e3), actuator.limits.pressure)
-    pressures = np.linspace(0.0, top, CURVE_POINTS)
+    pressures = np.linspace(0.0, _top(data), CURVE_POINTS)
     found: dict[str, Response] = {}
     notes: list[str] = []
     for model in actuator.predictions:
@@ -95,6 +99,21 @@ def _predictions(data: RunData, job: Job) -> tuple[dict[str, Response], list[str
             continue
         notes += [f"The model {model}: {note}" for note in found[model].notes]
     return found, notes
+
+
+def _top(data: RunData) -> float:
+    """The highest pressure in Pa that the run asked for or reached, within the actuator's limit."""
+    sections = [data.setup.protocol.deformation, data.setup.protocol.blocked_force]
+    asked = max((s.pressures.stop for s in sections if s is not None), default=0.0)
+    return min(max(asked, data.highest_kpa * 1e3), data.setup.actuator.limits.pressure)
+
+
+def _strength(analysis: Analysis, job: Job) -> StrengthSection | None:
+    """Stress and strain where finite elements were among the models that answered."""
+    if FINITE_ELEMENTS not in analysis.predictions:
+        return None
+    setup = analysis.data.setup
+    return strength_section(setup.actuator, setup.material, _top(analysis.data), job)
 
 
 def _published() -> Sequence[PublishedReference]:

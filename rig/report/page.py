@@ -21,6 +21,7 @@ from rig.report.figures import (
     trace_figure,
 )
 from rig.report.pictures import overlay_pictures
+from rig.report.strength import StrengthSection
 from rig.report.summary import (
     ControllerSummary,
     ExperimentSummary,
@@ -119,7 +120,12 @@ class AttachedFile:
     text: str | None
 
 
-def render_report(data: RunData, summary: RunSummary, predictions: Mapping[str, Response]) -> str:
+def render_report(
+    data: RunData,
+    summary: RunSummary,
+    predictions: Mapping[str, Response],
+    strength: StrengthSection | None = None,
+) -> str:
     """HTML text of the report; the same run gives the same bytes."""
     sections = [
         Section(
@@ -150,12 +156,18 @@ def render_report(data: RunData, summary: RunSummary, predictions: Mapping[str, 
         planned=sum(e.planned for e in summary.experiments.values()),
         trace=trace_figure(data) if data.trace.time_s.size else None,
         step=step_figure(data, first),
+        strength=strength,
         pictures=overlay_pictures(data),
         warnings=_warnings(data),
         parameters=sorted(data.reader.start().parameters.items()),
         setup=data.setup,
         files=_files(data),
     )
+
+
+def render_strength(strength: StrengthSection, title: str) -> str:
+    """HTML text of a page with the 3D view and the safety factors alone."""
+    return environment().get_template("view3d_page.html.j2").render(strength=strength, title=title)
 
 
 def headline(summary: RunSummary) -> tuple[str, ...]:

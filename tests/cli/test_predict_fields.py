@@ -34,7 +34,18 @@ def test_fields_come_at_the_pressures_solved_for(rig: Command, tmp_path: Path) -
     assert sorted(p.name for p in folder.glob("*.vtu")) == [s.attrib["file"] for s in sets]
 
 
+def test_a_page_to_turn_is_written(rig: Command, tmp_path: Path) -> None:
+    page = tmp_path / "view.html"
+    asked = ("predict", "--actuator", SPEC, "--model", "fe", "--pressures", "0:1:1", "--view")
+    assert rig(*asked, page).code == 0
+    assert "bellow-bending, Agilus30" in page.read_text()
+    outcome = rig(*asked, tmp_path / "no folder" / "view.html")
+    assert outcome.code == 1
+    assert "the view cannot be written to" in outcome.err
+
+
 def test_fields_without_finite_elements_are_refused(rig: Command, tmp_path: Path) -> None:
-    outcome = rig("predict", "--actuator", SPEC, "--model", "beam", "--vtu", tmp_path)
-    assert outcome.code == 2
-    assert "add --model fe" in outcome.err
+    for option in ("--vtu", "--view"):
+        outcome = rig("predict", "--actuator", SPEC, "--model", "beam", option, tmp_path)
+        assert outcome.code == 2
+        assert "add --model fe" in outcome.err

@@ -52,12 +52,15 @@ def _solved(model: Model) -> Solution:
     return result.solutions[0]
 
 
+@pytest.mark.parametrize("mixed", [True, False])
 @pytest.mark.parametrize("name", SOLIDS)
-def test_a_pulled_bar_has_the_stress_and_stretch_of_the_material_test(name: str) -> None:
+def test_a_pulled_bar_has_the_stress_and_stretch_of_the_material_test(
+    name: str, mixed: bool
+) -> None:
     energy, volume = Yeoh(60e3, 5e3, 1e3), QuadraticVolume(BULK)
     bar = response(Hyperelastic(energy, volume), Mode.UNIAXIAL, np.array([1.6]))
     across = float(bar.transverse_stretch[0])
-    d = discretise(MESHES[name][0])
+    d = discretise(MESHES[name][0], mixed=mixed)
     solid = Solid(d, energy, volume)
     solution = _solved(_driven(d, [solid], np.diag([0.6, across - 1, across - 1])))
     true_stress = float((bar.nominal_stress * 1.6 / bar.volume_ratio)[0])

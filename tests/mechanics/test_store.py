@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rig.mechanics import store
-from rig.mechanics.store import FolderStore, content_key
+from rig.mechanics.store import FolderStore, NoStore, Remembering, content_key
 
 ENTRY = {"angle": np.array([0.1, 0.2]), "stopped": np.array("far"), "final": np.array(True)}
 
@@ -69,3 +69,18 @@ def test_a_key_knows_what_was_asked_and_the_code(monkeypatch: pytest.MonkeyPatch
 def test_the_cache_folder_can_be_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RIG_CACHE_DIR", str(tmp_path))
     assert FolderStore.of_user().folder == tmp_path
+
+
+def test_a_remembering_store_answers_from_memory_and_fills_the_one_behind(tmp_path: Path) -> None:
+    behind = FolderStore(tmp_path)
+    behind.save("before", ENTRY)
+    remembering = Remembering(behind)
+    assert remembering.load("before") is not None
+    remembering.save("new", ENTRY)
+    assert behind.load("new") is not None
+    for file in tmp_path.glob("*.npz"):
+        file.unlink()
+    assert remembering.load("before") is not None
+    assert remembering.load("new") is ENTRY
+    assert remembering.load("other") is None
+    assert Remembering(NoStore()).load("new") is None, "nothing is shared between two of them"

@@ -7,13 +7,19 @@ limit as the mesh is refined, singular edge or not, because the volume above a g
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.mechanics.fe.fields import Fields, point_fields, recovered
+from rig.mechanics.fe.fields import (
+    Fields,
+    NodalFields,
+    PointFields,
+    all_point_fields,
+    recovered,
+)
 from rig.mechanics.fe.model import Model
 from rig.mechanics.fe.path import Solution
 
@@ -57,12 +63,15 @@ class Extremes:
 
 def summarise(model: Model, solution: Solution) -> Extremes:
     """Largest stresses and strains of a model at one of its solutions."""
-    state = solution.state
-    inside = [
-        point_fields(solid, state.x, points)
-        for solid, points in zip(model.solids, state.points, strict=True)
-    ]
+    inside = all_point_fields(model, solution.state)
     outside = [recovered(s, at) for s, at in zip(model.solids, inside, strict=True)]
+    return extremes_of(model, solution.pressure, inside, outside)
+
+
+def extremes_of(
+    model: Model, pressure: float, inside: Sequence[PointFields], outside: Sequence[NodalFields]
+) -> Extremes:
+    """The same of fields that are known: per solid at quadrature points and at nodes."""
     nodes = model.discretisation.nodes
     peaks = {
         name: _peak(
@@ -73,7 +82,7 @@ def summarise(model: Model, solution: Solution) -> Extremes:
         )
         for name, measure in _MEASURES.items()
     }
-    return Extremes(pressure=solution.pressure, **peaks)
+    return Extremes(pressure=pressure, **peaks)
 
 
 _MEASURES: dict[str, Callable[[Fields], Array]] = {

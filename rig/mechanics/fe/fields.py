@@ -111,7 +111,7 @@ def point_fields(solid: Solid, x: Array, points: PointState) -> PointFields:
     f = solid.deformation_gradient(x)
     flat = f.reshape(3, 3, -1)
     j = determinant(flat, cofactor(flat))
-    first = solid.distortion.first_piola(flat)
+    first = solid.law.first_piola(flat)
     stress = np.einsum("ikn,jkn->ijn", first, flat) / j
     pressure = solid.pressure(x, points).reshape(-1)
     for i in range(3):
@@ -145,12 +145,32 @@ def recovered(solid: Solid, at: PointFields) -> NodalFields:
     return NodalFields(averaged(at.stress), averaged(at.log_strain), nodes)
 
 
-def nodal_fields(model: Model, state: State) -> tuple[NodalFields, ...]:
-    """Fields at the nodes of every solid of a model; a node between two solids is in both."""
+def all_point_fields(model: Model, state: State) -> tuple[PointFields, ...]:
+    """Fields at the quadrature points of every solid of a model."""
     return tuple(
-        recovered(solid, point_fields(solid, state.x, points))
+        point_fields(solid, state.x, points)
         for solid, points in zip(model.solids, state.points, strict=True)
     )
+
+
+def nodal_fields(model: Model, state: State) -> tuple[NodalFields, ...]:
+    """Fields at the nodes of every solid of a model; a node between two solids is in both."""
+    inside = all_point_fields(model, state)
+    return tuple(recovered(solid, at) for solid, at in zip(model.solids, inside, strict=True))
+
+
+def numbering(model: Model) -> tuple[Integers, tuple[Integers, ...]]:
+    """Nodes of all solids one after another, as in `nodal_fields`, (n,), and per solid its
+    elements' places in that list, (elements, a): nodes between two solids are there twice."""
+    nodes, elements, offset = [], [], 0
+    for solid in model.solids:
+        own, local = np.unique(
+            model.discretisation.connectivity[solid.elements], return_inverse=True
+        )
+        elements.append(offset + local.reshape(len(solid.elements), -1))
+        nodes.append(own)
+        offset += len(own)
+    return np.concatenate(nodes), tuple(elements)
 
 
 def displacements(discretisation: Discretisation, state: State) -> Array:

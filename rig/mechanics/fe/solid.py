@@ -110,7 +110,8 @@ class Solid:
         d = discretisation
         self.distortion = distortion
         self.volume = volume
-        self._law = distortion if d.mixed else Hyperelastic(distortion, volume)
+        self.law: Energy = distortion if d.mixed else Hyperelastic(distortion, volume)
+        """The energy that the displacements alone carry; the pressures, if any, carry the rest."""
         self._dim = d.dim
         self._components = d.kinematics.components
         self._gradients = _unique_arrays(d.gradients, self.elements)
@@ -148,7 +149,7 @@ class Solid:
         j = determinant(flat, cofactor(flat)).reshape(p.shape)
         j_of_p, _ = volume_ratio(self.volume, p)
         conjugate = p * j_of_p - self.volume.energy(j_of_p)
-        density = self._law.energy(f) + p * j - conjugate
+        density = self.law.energy(f) + p * j - conjugate
         return float(np.sum(self._weights * density))
 
     def free_points(self, x: Array, points: PointState) -> PointState:
@@ -157,7 +158,7 @@ class Solid:
         flat = f.reshape(3, 3, -1)
         cof = cofactor(flat)
         p = self.pressure(x, points).reshape(-1)
-        first = self._law.first_piola(f).reshape(3, 3, -1) + p * cof
+        first = self.law.first_piola(f).reshape(3, 3, -1) + p * cof
         inverse = _inverse(flat, cof)
         return PointState(
             points.pressure,
@@ -289,10 +290,10 @@ class Solid:
     def _point(self, f: Array, p: Array, points: PointState, chunk: slice, tangent: bool) -> _Point:
         if points.strain is None or points.stress is None:
             cof = cofactor(f)
-            stress = self._law.first_piola(f) + p * cof
+            stress = self.law.first_piola(f) + p * cof
             slope = None
             if tangent:
-                slope = self._law.tangent(f)
+                slope = self.law.tangent(f)
                 add_cofactor_slope(slope, p, f)
             j = determinant(f, cof)
             return _Point(stress, slope, cof, j, 0.0, float(j.min()))
@@ -303,8 +304,8 @@ class Solid:
         cof = cofactor(own)
         inverse = _inverse(own, cof)
         gap = (right_cauchy_green(f) - c) / 2
-        first = self._law.first_piola(own) + p * cof
-        material = self._law.tangent(own)
+        first = self.law.first_piola(own) + p * cof
+        material = self.law.tangent(own)
         add_cofactor_slope(material, p, own)
         second = product(inverse, first)
         _add_second(material, -second)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rig.mechanics.fe.discretisation import Integers
 from rig.mechanics.fe.errors import FiniteElementError
-from rig.mechanics.fe.fields import displacements, nodal_fields
+from rig.mechanics.fe.fields import displacements, nodal_fields, numbering
 from rig.mechanics.fe.model import Model
 from rig.mechanics.fe.path import Solution
 
@@ -102,13 +102,8 @@ def grid_of(model: Model, mirror: int | None = None) -> Grid:
     d = model.discretisation
     kind = _CELLS[type(d.element)]
     order = _matching(_places(kind), np.asarray(d.element.doflocs))
-    nodes, blocks, offset = [], [], 0
-    for solid in model.solids:
-        own, local = np.unique(d.connectivity[solid.elements], return_inverse=True)
-        blocks.append(offset + local.reshape(len(solid.elements), -1)[:, order])
-        nodes.append(own)
-        offset += len(own)
-    node = np.concatenate(nodes)
+    node, elements = numbering(model)
+    blocks = [element[:, order] for element in elements]
     entry = np.arange(len(node))
     points = np.zeros((len(node), 3))
     points[:, : d.dim] = d.nodes[node]
