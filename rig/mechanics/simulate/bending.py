@@ -7,6 +7,7 @@ otherwise, mixed in pressure, follower pressure in the cavity, gravity along the
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from rig.mechanics.bellow import BellowShape
 from rig.mechanics.errors import MechanicsError
 from rig.mechanics.fe import (
+    Discretisation,
     Model,
     PressureSurface,
     RigidBody,
@@ -99,13 +101,13 @@ def bending_model(
     resolution: BendingResolution | None = None,
     acceleration: tuple[float, float, float] = HANGING,
     cap_density: float | None = None,
-    items: tuple[Item, ...] = (),
+    items: Callable[[Discretisation, BellowShape], Sequence[Item]] | None = None,
 ) -> BendingModel:
     """Mesh the actuator and put its model together.
 
     `acceleration` is gravity in m/s2. The paper is silent about the cap's material; its weight is
     that of `cap_density` in kg/m3, by default the soft material's: both are printed photopolymers.
-    `items` act on the model beside pressure and weight, such as an obstacle for its tip.
+    `items` makes what acts on the model beside pressure and weight, such as a stop for its tip.
     Raises MechanicsError for a material without a volumetric energy.
     """
     return bending_model_on(
@@ -125,7 +127,7 @@ def bending_model_on(
     order: int | None = None,
     acceleration: tuple[float, float, float] = HANGING,
     cap_density: float | None = None,
-    items: tuple[Item, ...] = (),
+    items: Callable[[Discretisation, BellowShape], Sequence[Item]] | None = None,
 ) -> BendingModel:
     """The same on a mesh that is there already; `mixed` and `order` as `discretise` takes them."""
     energies = hyperelastic_from(material)
@@ -158,7 +160,7 @@ def bending_model_on(
                 weight=weight * np.array(acceleration),
             )
         ],
-        items=items,
+        items=items(d, shape) if items is not None else (),
     )
     return BendingModel(model, soft, shape, body.bottom_far_edge, density, acceleration)
 
