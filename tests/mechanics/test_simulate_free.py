@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from rig.mechanics.fe import Model, Progress, State, rotation_vector
+from rig.mechanics.fe import Model, Progress, State, rotation_vector, summarise
 from rig.mechanics.job import Job
 from rig.mechanics.simulate.free import RUNGS, ActuatorModel, FreeInflation
 from rig.mechanics.store import Entry
@@ -67,6 +67,9 @@ def test_rungs_are_twelfths_of_the_limit_and_cover_what_was_asked(complete: Memo
     assert curves.stopped is None
     assert np.all(np.diff(curves.angle) > 0)
     assert np.all(np.diff(curves.volume) > 0)
+    actuator, solutions = question().solutions(LIMIT / 4, Job(complete))
+    largest = [summarise(actuator.model, s).von_mises.value for s in solutions]
+    np.testing.assert_allclose(curves.max_von_mises, largest, rtol=1e-12)
 
 
 def test_a_lower_question_gets_only_what_it_asked_for(complete: Memory) -> None:

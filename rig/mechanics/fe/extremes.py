@@ -17,8 +17,11 @@ from rig.mechanics.fe.fields import (
     Fields,
     NodalFields,
     PointFields,
+    Recovery,
     all_point_fields,
+    cauchy_stress,
     recovered,
+    von_mises,
 )
 from rig.mechanics.fe.model import Model
 from rig.mechanics.fe.path import Solution
@@ -66,6 +69,15 @@ def summarise(model: Model, solution: Solution) -> Extremes:
     inside = all_point_fields(model, solution.state)
     outside = [recovered(s, at) for s, at in zip(model.solids, inside, strict=True)]
     return extremes_of(model, solution.pressure, inside, outside)
+
+
+def largest_von_mises(model: Model, solution: Solution) -> float:
+    """`summarise(...).von_mises.value` in Pa alone, at a fraction of the cost."""
+    state = solution.state
+    return max(
+        float(von_mises(Recovery(solid).tensor(cauchy_stress(solid, state.x, points))).max())
+        for solid, points in zip(model.solids, state.points, strict=True)
+    )
 
 
 def extremes_of(

@@ -59,10 +59,7 @@ class Fields:
     @cached_property
     def von_mises(self) -> Array:
         """Equivalent Cauchy stress in Pa, (...); that of a pulled bar is its true stress."""
-        deviator = self.stress.copy()
-        for i in range(3):
-            deviator[i, i] += self.pressure
-        return np.asarray(np.sqrt(1.5 * np.einsum("ij...,ij...->...", deviator, deviator)))
+        return von_mises(self.stress)
 
     @cached_property
     def principal_stress(self) -> Array:
@@ -103,46 +100,71 @@ class NodalFields(Fields):
     """The solid's displacement nodes, ascending, (n,)."""
 
 
+def von_mises(stress: Array) -> Array:
+    """Equivalent stress, (...), of Cauchy stresses (3, 3, ...)."""
+    deviator = stress.copy()
+    for i in range(3):
+        deviator[i, i] -= np.trace(stress) / 3
+    return np.asarray(np.sqrt(1.5 * np.einsum("ij...,ij...->...", deviator, deviator)))
+
+
+def cauchy_stress(solid: Solid, x: Array, points: PointState) -> Array:
+    """Cauchy stress at the quadrature points of one solid in Pa, (3, 3, elements, q)."""
+    f = solid.deformation_gradient(x)
+    flat = f.reshape(3, 3, -1)
+    j = determinant(flat, cofactor(flat))
+    stress = np.einsum("ikn,jkn->ijn", solid.law.first_piola(flat), flat) / j
+    pressure = solid.pressure(x, points).reshape(-1)
+    for i in range(3):
+        stress[i, i] += pressure
+    return np.asarray(stress.reshape(f.shape))
+
+
+def log_strain(solid: Solid, x: Array) -> Array:
+    """Spatial logarithmic strain at the quadrature points of one solid, (3, 3, elements, q)."""
+    f = solid.deformation_gradient(x)
+    found = spectrum(f.reshape(3, 3, -1))
+    scaled = np.log(found.stretches) * found.left
+    return np.asarray(np.einsum("ian,jan->ijn", scaled, found.left).reshape(f.shape))
+
+
 def point_fields(solid: Solid, x: Array, points: PointState) -> PointFields:
     """Fields at the quadrature points, where nothing is smoothed.
 
     `x` are the model's degrees of freedom, `points` the solid's own unknowns, both of a `State`.
     """
-    f = solid.deformation_gradient(x)
-    flat = f.reshape(3, 3, -1)
-    j = determinant(flat, cofactor(flat))
-    first = solid.law.first_piola(flat)
-    stress = np.einsum("ikn,jkn->ijn", first, flat) / j
-    pressure = solid.pressure(x, points).reshape(-1)
-    for i in range(3):
-        stress[i, i] += pressure
-    found = spectrum(flat)
-    scaled = np.log(found.stretches) * found.left
-    log_strain = np.einsum("ian,jan->ijn", scaled, found.left)
     weights = solid.discretisation.weights[solid.elements]
-    return PointFields(stress.reshape(f.shape), log_strain.reshape(f.shape), weights)
+    return PointFields(cauchy_stress(solid, x, points), log_strain(solid, x), weights)
+
+
+class Recovery:
+    """What brings tensors at the quadrature points of one solid to its nodes."""
+
+    def __init__(self, solid: Solid) -> None:
+        d = solid.discretisation
+        weights = d.weights[solid.elements]
+        connectivity = d.connectivity[solid.elements]
+        self.nodes, local = np.unique(connectivity, return_inverse=True)
+        self._fit = _fit(d, weights)
+        self._local = local.reshape(-1)
+        self._share = np.repeat(weights.sum(axis=1), connectivity.shape[1])
+        self._total = np.bincount(self._local, weights=self._share)
+
+    def tensor(self, at_points: Array) -> Array:
+        """A symmetric tensor (3, 3, elements, q) at the nodes, (3, 3, n)."""
+        result = np.empty((3, 3, len(self.nodes)))
+        for i in range(3):
+            for k in range(i, 3):
+                own = (self._fit @ at_points[i, k, :, :, None])[..., 0].reshape(-1)
+                result[i, k] = np.bincount(self._local, weights=self._share * own) / self._total
+                result[k, i] = result[i, k]
+        return result
 
 
 def recovered(solid: Solid, at: PointFields) -> NodalFields:
     """The fields at the solid's nodes, from those at its quadrature points."""
-    d = solid.discretisation
-    fit = _fit(d, at.weights)
-    connectivity = d.connectivity[solid.elements]
-    nodes, local = np.unique(connectivity, return_inverse=True)
-    flat = local.reshape(-1)
-    share = np.broadcast_to(at.weights.sum(axis=1)[:, None], connectivity.shape).reshape(-1)
-    total = np.bincount(flat, weights=share)
-
-    def averaged(tensor: Array) -> Array:
-        result = np.empty((3, 3, len(nodes)))
-        for i in range(3):
-            for k in range(i, 3):
-                own = (fit @ tensor[i, k, :, :, None])[..., 0].reshape(-1)
-                result[i, k] = np.bincount(flat, weights=share * own) / total
-                result[k, i] = result[i, k]
-        return result
-
-    return NodalFields(averaged(at.stress), averaged(at.log_strain), nodes)
+    recovery = Recovery(solid)
+    return NodalFields(recovery.tensor(at.stress), recovery.tensor(at.log_strain), recovery.nodes)
 
 
 def all_point_fields(model: Model, state: State) -> tuple[PointFields, ...]:

@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.mechanics.fe import Model, Point, Solution, State, follow
+from rig.mechanics.fe import Model, Point, Solution, State, follow, largest_von_mises
 from rig.mechanics.fe.state import PointState, Pose
 from rig.mechanics.job import Job
 from rig.mechanics.store import Entry
@@ -58,6 +58,7 @@ class FreeCurves:
     angle: Array
     displacement: Array
     volume: Array
+    max_von_mises: Array
     stopped: str | None
     """Why there are no more rungs; None where all that were asked for were reached."""
 
@@ -81,6 +82,7 @@ class FreeInflation:
             angle=entry["angle"][:count],
             displacement=entry["displacement"][:count],
             volume=entry["volume"][:count],
+            max_von_mises=entry["max_von_mises"][:count],
             stopped=stopped or None,
         )
 
@@ -124,6 +126,7 @@ def _entry_of(
         "angle": np.array([actuator.angle(s) for s in states]),
         "displacement": np.array([actuator.displacement(s) for s in states]),
         "volume": np.array([actuator.volume(s.volume) for s in solutions]),
+        "max_von_mises": np.array([largest_von_mises(actuator.model, s) for s in solutions]),
         "stopped": np.array(failure or ""),
         # trying again would end at the same place, unless it was cancelled
         "final": np.array(failure is not None and not cancelled),

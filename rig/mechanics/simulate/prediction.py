@@ -56,5 +56,6 @@ def finite_element_response(
         displacement=at(curves.displacement),
         blocked_force=None,
         volume=at(curves.volume),
+        max_von_mises=at(curves.max_von_mises),
         notes=() if curves.stopped is None else (curves.stopped,),
     )
