@@ -1,6 +1,12 @@
-"""Problems with known answers: patch tests, thick walls, Cook's membrane, beams, large rotation."""
+"""Problems with known answers: patch tests, thick walls, Cook's membrane, beams, large rotation.
+
+The last test compares what they compute with the table in docs/theory/finite-elements.md.
+"""
 
 from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -100,6 +106,7 @@ def _inflated(d, supports, bore_dof: int, bore: float):
     return result.solutions[0]
 
 
+@cache
 def _pressure_of_cylinder(n: int, family: str) -> float:
     mesh = ring(n, 2 * n, INNER, OUTER)
     if family == "triangles":
@@ -110,6 +117,7 @@ def _pressure_of_cylinder(n: int, family: str) -> float:
     return _inflated(d, supports, corner, CYLINDER["bore"]).pressure
 
 
+@cache
 def _pressure_of_sphere(n: int, family: str) -> float:
     mesh = ring(n, 2 * n, INNER, OUTER)
     if family == "triangles":
@@ -149,6 +157,7 @@ def test_pressure_control_finds_the_bore_that_displacement_control_was_given() -
     assert bore == pytest.approx(CYLINDER["bore"], rel=2e-4)
 
 
+@cache
 def _cook(n: int, family: str, mixed: bool = True) -> float:
     """Rise of the tip's upper corner of Cook's membrane, nu 0.4999, in plane strain."""
     mesh = skfem.MeshQuad.init_tensor(np.linspace(0, 1, n + 1), np.linspace(0, 1, n + 1))
@@ -210,7 +219,9 @@ def _clamped_line(d):
     ]
 
 
-def test_a_slender_beam_bends_as_euler_says() -> None:
+@cache
+def _euler() -> tuple[float, float]:
+    """Rise of a slender cantilever's tip under a small load: ours, Euler's."""
     length, height = 1.0, 0.02
     d, solid, flexural, tip = _cantilever(length, height, 20)
     force = 1e-4 * flexural / length**2
@@ -218,9 +229,14 @@ def test_a_slender_beam_bends_as_euler_says() -> None:
     model = Model(d, [solid], supports=_clamped_line(d), dead_load=load)
     result = follow(model, [Point(0.0)])
     node = int(d.nodes_at(x=length, y=0.0)[0])
-    rise = result.solutions[0].state.x[2 * node + 1]
+    rise = float(result.solutions[0].state.x[2 * node + 1])
+    return rise, force * length**3 / (3 * flexural)
+
+
+def test_a_slender_beam_bends_as_euler_says() -> None:
+    rise, expected = _euler()
     # shear adds (h / L)^2 / 2 or so
-    assert rise == pytest.approx(force * length**3 / (3 * flexural), rel=4e-4)
+    assert rise == pytest.approx(expected, rel=4e-4)
 
 
 # dead tip load P L2 / (E I): tip deflection w / L and shortening u / L of the elastica
@@ -228,7 +244,8 @@ def test_a_slender_beam_bends_as_euler_says() -> None:
 ELASTICA = {1.0: (0.30172, 0.05643), 2.0: (0.49346, 0.16064), 10.0: (0.81061, 0.55500)}
 
 
-def test_a_cantilever_follows_the_elastica_through_large_rotation() -> None:
+@cache
+def _elastica() -> dict[float, tuple[float, float]]:
     length, height = 1.0, 0.01
     d, solid, flexural, tip = _cantilever(length, height, 25)
     load = traction(d, tip, np.array([0.0, flexural / length**2 / height]))
@@ -236,7 +253,54 @@ def test_a_cantilever_follows_the_elastica_through_large_rotation() -> None:
     result = follow(model, [Point(0.0, dead=p) for p in ELASTICA])
     assert result.failure is None
     node = int(d.nodes_at(x=length, y=0.0)[0])
-    for solution, (rise, shortening) in zip(result.solutions, ELASTICA.values(), strict=True):
-        u = solution.state.x[2 * node : 2 * node + 2]
-        assert u[1] / length == pytest.approx(rise, rel=1e-3)
-        assert -u[0] / length == pytest.approx(shortening, rel=1e-3)
+    moved = (solution.state.x[2 * node : 2 * node + 2] for solution in result.solutions)
+    return {p: (u[1] / length, -u[0] / length) for p, u in zip(ELASTICA, moved, strict=True)}
+
+
+def test_a_cantilever_follows_the_elastica_through_large_rotation() -> None:
+    for load, expected in ELASTICA.items():
+        assert _elastica()[load] == pytest.approx(expected, rel=1e-3)
+
+
+def _figures() -> dict[str, tuple[float, float, float | None]]:
+    """By problem: reference, ours, and the order at which it converges where there is one."""
+    found: dict[str, tuple[float, float, float | None]] = {}
+    for body, solve, exact, exponent in (
+        ("cylinder", _pressure_of_cylinder, CYLINDER, 2),
+        ("sphere", _pressure_of_sphere, SPHERE, 3),
+    ):
+        for family in ("quads", "triangles"):
+            reference = _closed_form(exact["bore"], exponent)
+            coarse, fine = (solve(n, family) for n in (4, 8))
+            order = np.log2(abs(coarse - reference) / abs(fine - reference))
+            found[f"thick {body}, {family}, MPa"] = (reference, fine, float(order))
+    for family, other in (("quads", "triangles"), ("triangles", "quads")):
+        steps = np.diff([_cook(n, family) for n in (4, 8, 16)])
+        order = float(np.log2(steps[0] / steps[1]))
+        found[f"Cook's membrane, {family}, mm"] = (_cook(16, other), _cook(16, family), order)
+    rise, expected = _euler()
+    found["slender cantilever, w / Euler's"] = (1.0, rise / expected, None)
+    for load, (w, u) in ELASTICA.items():
+        ours = _elastica()[load]
+        found[f"elastica, P L²/EI = {load:g}, w/L"] = (w, ours[0], None)
+        found[f"elastica, P L²/EI = {load:g}, u/L"] = (u, ours[1], None)
+    return found
+
+
+def test_the_table_in_the_docs_is_what_these_compute() -> None:
+    page = Path(__file__).resolve().parents[2] / "docs" / "theory" / "finite-elements.md"
+    lines = page.read_text(encoding="utf-8").split("| problem | reference | ours |", 1)[1]
+    rows = [line.strip("| ").split(" | ") for line in lines.split("\n\n")[0].splitlines()[2:]]
+    written = {row[0]: row[1:] for row in rows}
+    figures = _figures()
+    assert written.keys() == figures.keys()
+    for problem, (reference, ours, order) in figures.items():
+        cells = [cell.strip() for cell in [*written[problem], ""][:4]]
+        # half a unit of the last digit written, and another for other processors' round-off
+        assert float(cells[0]) == pytest.approx(reference, rel=1e-5), problem
+        assert float(cells[1]) == pytest.approx(ours, rel=1e-5), problem
+        error = 100 * abs(ours / reference - 1)
+        assert float(cells[2].removesuffix(" %")) == pytest.approx(error, abs=1e-3), problem
+        assert (cells[3] == "") == (order is None)
+        if order is not None:
+            assert float(cells[3]) == pytest.approx(order, abs=0.1), problem
