@@ -9,7 +9,8 @@ from pathlib import Path
 from rig.spec.actuator import ActuatorSpec
 from rig.spec.bench import BenchSpec
 from rig.spec.errors import Problem, SpecError
-from rig.spec.loading import parse_any, read_text
+from rig.spec.loading import Loaded, parse_any, read_text
+from rig.spec.material import MaterialSpec
 from rig.spec.workspace import SUFFIXES, Workspace
 
 
@@ -21,6 +22,8 @@ class FileReport:
     kind: str
     """Kind of the spec; empty if the file is none."""
     problems: tuple[Problem, ...]
+    material: Loaded[MaterialSpec] | None = None
+    """The material that the file is, or that its actuator is made of."""
 
     @property
     def is_ok(self) -> bool:
@@ -49,7 +52,7 @@ def check_file(path: Path) -> FileReport:
     Names in it are looked up in the workspace around it, else in the one around the current
     directory, else in the library shipped with rig.
     """
-    kind = ""
+    kind, material = "", None
     try:
         source = parse_any(read_text(path), path)
         kind = source.spec.kind
@@ -57,16 +60,18 @@ def check_file(path: Path) -> FileReport:
         if workspace.is_library:
             workspace = Workspace.find()
         if isinstance(source.spec, ActuatorSpec):
-            workspace.resolve_actuator(source)
+            material = workspace.resolve_actuator(source)
         elif isinstance(source.spec, BenchSpec):
             workspace.resolve_bench_file(source)
+        elif isinstance(source.spec, MaterialSpec):
+            material = source
     except SpecError as error:
         return FileReport(path, kind, error.problems)
     except Exception as error:  # a defect must not hide what is wrong with the other files
         why = f"{type(error).__name__}: {error}"
         message = f"could not be checked; this is a defect in rig, please report it: {why}"
         return FileReport(path, kind, (Problem(path, message),))
-    return FileReport(path, kind, ())
+    return FileReport(path, kind, (), material)
 
 
 def yaml_beneath(folder: Path) -> list[Path]:

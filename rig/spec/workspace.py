@@ -223,7 +223,7 @@ class Workspace:
         material = self._referred(source, ("material",), "material", MaterialSpec)
         why = pressure_beyond_material(source.spec, material.spec)
         if why is not None:
-            raise SpecError([_problem_at(source, ("limits", "pressure"), why)])
+            raise SpecError([problem_at(source, ("limits", "pressure"), why)])
         return material
 
     def resolve_bench_file(self, source: Loaded[BenchSpec]) -> dict[str, Loaded[Any]]:
@@ -273,7 +273,7 @@ class Workspace:
         except SpecError as error:
             why = error.problems[0]
             message = f"{why.path}: {why.message}"
-            raise SpecError([_problem_at(source, location, message)]) from None
+            raise SpecError([problem_at(source, location, message)]) from None
         return read(path, model)
 
 
@@ -289,7 +289,8 @@ def library_root() -> Path:
     return shipped if shipped.is_dir() else package.parent
 
 
-def _problem_at(source: Loaded[Any], location: Location, message: str) -> Problem:
+def problem_at(source: Loaded[Any], location: Location, message: str) -> Problem:
+    """A problem with the value at a location of a file, with its line and column."""
     if not source.text:
         return Problem(source.path, message, dotted(location))
     place = parse_tree(source.text, source.path).place_of_value(location)

@@ -49,6 +49,52 @@ def test_check_says_ok_for_sound_files(rig) -> None:  # type: ignore[no-untyped-
     ]
 
 
+UNSTABLE = """
+hyperelastic:
+  energy: mooney-rivlin
+  c10: 90 kPa
+  c01: -15 kPa
+  source: a test's
+"""
+
+
+def test_check_warns_once_of_an_energy_that_is_unstable_before_the_material_breaks(
+    rig,  # type: ignore[no-untyped-def]
+    tmp_path: Path,
+) -> None:
+    text = (ROOT / "models/materials/agilus30.yaml").read_text(encoding="utf-8")
+    material = tmp_path / "soft.yaml"
+    material.write_text(text + UNSTABLE, encoding="utf-8")
+    actuator = tmp_path / "actuator.yaml"
+    drawn = ACTUATOR.read_text(encoding="utf-8")
+    actuator.write_text(
+        drawn.replace("material: agilus30", "material: soft.yaml"), encoding="utf-8"
+    )
+    code, out, _ = rig("check", actuator, material)
+    assert code == 0
+    first, second, warning = out.splitlines()
+    assert first.startswith("OK ")
+    assert second.startswith("OK ")
+    line = text.count("\n") + 3
+    assert warning.startswith(f"warning {material}:{line}:")
+    assert "hyperelastic.energy: MooneyRivlin" in warning
+    assert "checked were stretches from 0.27027 to 3.7" in warning
+    code, out, _ = rig("check", "--json", material)
+    (only,) = json.loads(out)["warnings"]
+    assert only["field"] == "hyperelastic.energy"
+    assert "unstable" in only["message"]
+
+
+def test_check_does_not_warn_of_what_happens_beyond_break(rig, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    text = (ROOT / "models/materials/agilus30.yaml").read_text(encoding="utf-8")
+    material = tmp_path / "soft.yaml"
+    slight = UNSTABLE.replace("-15 kPa", "-0.01 kPa")
+    material.write_text(text + slight, encoding="utf-8")
+    code, out, _ = rig("check", material)
+    assert code == 0
+    assert out.splitlines() == [f"OK {material} (material)"]
+
+
 def test_check_tells_every_problem_of_every_file_and_fails(rig, broken: Path) -> None:  # type: ignore[no-untyped-def]
     code, out, err = rig("check", broken, ACTUATOR, broken.parent / "none.yaml")
     assert code == 1

@@ -19,7 +19,11 @@ from rig.mechanics.hyperelastic.responses import (
     incompressible_response,
     response,
 )
-from rig.mechanics.hyperelastic.stability import Stability, check_stability
+from rig.mechanics.hyperelastic.stability import (
+    Stability,
+    check_stability,
+    material_stability,
+)
 from rig.mechanics.hyperelastic.volumetric import LogarithmicVolume, QuadraticVolume, abaqus_volume
 
 __all__ = [
@@ -46,6 +50,7 @@ __all__ = [
     "check_stability",
     "hyperelastic_from",
     "incompressible_response",
+    "material_stability",
     "neo_hookean_from",
     "response",
     "shear_modulus_at_rest",

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.mechanics.errors import MechanicsError
+from rig.mechanics.hyperelastic.build import hyperelastic_from
 from rig.mechanics.hyperelastic.protocol import Array, Energy
 from rig.mechanics.hyperelastic.responses import (
     Mode,
@@ -21,6 +22,7 @@ from rig.mechanics.hyperelastic.responses import (
     incompressible_free_stretch,
     principal_stretches,
 )
+from rig.spec.material import MaterialSpec
 
 LOWEST_STRETCH, HIGHEST_STRETCH = 0.1, 10.0
 """The range that Abaqus checks: nominal strains from -0.9 to 9."""
@@ -78,6 +80,19 @@ class Stability:
             "far may stop or show a collapse that no specimen has; keep the pressure below it, or "
             "fit the coefficients again with data that reach these stretches"
         )
+
+
+def material_stability(material: MaterialSpec) -> Stability:
+    """`check_stability` of a material as far as it can be stretched without breaking.
+
+    That is to 1 + its elongation at break, and to the inverse of it in compression; over Abaqus'
+    range where no elongation is known.
+    """
+    energy = hyperelastic_from(material).distortion
+    if material.elongation_at_break is None:
+        return check_stability(energy)
+    highest = 1 + material.elongation_at_break.high
+    return check_stability(energy, 1 / highest, highest)
 
 
 def check_stability(
