@@ -114,6 +114,11 @@ class Discretisation:
         return bool(self.pressure_values.shape[2])
 
     @property
+    def facet_nodes(self) -> int:
+        """Displacement nodes of one facet."""
+        return {27: 9, 10: 6, 9: 3, 6: 3}[self.connectivity.shape[1]]
+
+    @property
     def displacement_size(self) -> int:
         """Number of displacement degrees of freedom."""
         return int(self.nodes.size)

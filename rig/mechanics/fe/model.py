@@ -28,6 +28,9 @@ class Item(Protocol):
     dofs: Integers
     """Degrees of freedom it acts on, (parts, dofs), the same for the life of the model."""
 
+    symmetric: bool
+    """Whether its derivative is."""
+
     def evaluate(self, x: Array) -> tuple[Array, Array]:
         """Residual (parts, dofs), minus the force on the model, and its derivative by x."""
         ...
@@ -146,7 +149,8 @@ class Model:
     def symmetric(self) -> bool:
         """Whether the tangent is symmetric."""
         surface = self.surface
-        return surface is None or surface.symmetric or not surface.follower
+        walls = surface is None or surface.symmetric or not surface.follower
+        return walls and all(item.symmetric for item in self.items)
 
     def start(self) -> State:
         """At rest, without loads."""

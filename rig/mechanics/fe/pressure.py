@@ -82,7 +82,7 @@ class PressureSurface:
         slope = np.stack([np.moveaxis(b[0].grad, 0, 2) for b in basis.basis], -1)  # (f, q, dim, a)
         # shape functions that vanish on the facet do not matter: keep those of its own nodes
         size = np.abs(value).max(axis=1)
-        own = np.sort(np.argsort(-size, axis=1)[:, : _on_facet(d)], axis=1)
+        own = np.sort(np.argsort(-size, axis=1)[:, : d.facet_nodes], axis=1)
         self._value = np.take_along_axis(value, own[:, None, :], axis=2)
         slope = np.take_along_axis(slope, own[:, None, None, :], axis=3)
         self.nodes = np.take_along_axis(basis.element_dofs.T.astype(np.int64), own, axis=1)
@@ -163,10 +163,6 @@ class PressureSurface:
         return SurfaceEvaluation(
             residual.reshape(facets, -1), tangent, volume, -slope.reshape(facets, -1) / parts
         )
-
-
-def _on_facet(d: Discretisation) -> int:
-    return {27: 9, 10: 6, 9: 3, 6: 3}[d.connectivity.shape[1]]
 
 
 def _tangents(normal: Array) -> tuple[Array, ...]:

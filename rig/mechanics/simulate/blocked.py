@@ -136,6 +136,7 @@ class TipStop:
         low = middle[np.argmin(d.nodes[middle, 2])]
         high = middle[np.argmax(d.nodes[middle, 2])]
         lever = (shape.tip - d.nodes[low, 0]) / (d.nodes[high, 2] - d.nodes[low, 2])
+        self.symmetric = True
         self.dofs = np.array([[3 * low, 3 * low + 2, 3 * high]])
         self._weights = np.array([lever, 1.0, -lever])
         self._stiffness = stiffness
