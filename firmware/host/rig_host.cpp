@@ -25,6 +25,7 @@ struct rig_host {
   std::vector<uint8_t> received, transmitted;
   size_t taken = 0;  // of `transmitted`
   uint64_t time_ms = 0;
+  uint32_t dead_ms = 0;
   rig::Inputs inputs = {};
   rig_pins_out out = {};
 
@@ -35,6 +36,15 @@ struct rig_host {
   }
 
   void boot() { core.reset(new rig::RigCore(board, nonvolatile.data())); }
+
+  void restart(rig::ResetCause cause, uint32_t dead, bool powered) {
+    board.reset_cause = cause;
+    dead_ms = dead;
+    inputs = {};
+    out.steps = 0;
+    if (!powered) out = {0, 0, 1};
+    boot();
+  }
 
   void read_line() {
     for (const uint8_t byte : received) {
@@ -74,6 +84,11 @@ struct rig_host {
     rig_pins_in in = {};
     bench_fn(bench, &out, &in);
     ++time_ms;
+    if (dead_ms > 0) {
+      --dead_ms;
+      received.clear();
+      return;
+    }
     read_line();
     take_pins(in);
     const bool tick_ends = time_ms % rig::kTickMs == 0;
@@ -134,6 +149,10 @@ void rig_host_nonvolatile_load(rig_host *host, const uint8_t *image) {
 
 void rig_host_nonvolatile_store(const rig_host *host, uint8_t *image) {
   std::copy(host->nonvolatile.begin(), host->nonvolatile.end(), image);
+}
+
+void rig_host_restart(rig_host *host, uint8_t reset_cause, uint32_t dead_ms, int powered) {
+  host->restart(static_cast<rig::ResetCause>(reset_cause), dead_ms, powered != 0);
 }
 
 unsigned rig_host_parameter_count(void) { return rig::Parameters::kCount; }

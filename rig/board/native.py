@@ -11,7 +11,9 @@ from typing import Any
 from rig.board._firmware import ffi, lib
 from rig.board.simulated import BUFFER_BYTES, SimulatedBoard, SteppedBench
 
-RESET_POWER_ON = 1
+RESET_POWER_ON, RESET_BROWN_OUT, RESET_WATCHDOG = 1, 3, 4
+WATCHDOG_MS = 120
+"""How long the Mega's watchdog waits for a main loop that hangs."""
 
 
 class NativeBoard(SimulatedBoard):
@@ -47,3 +49,18 @@ class NativeBoard(SimulatedBoard):
     def _take(self) -> bytes:
         count = lib.rig_host_transmit(self._host, self._buffer, BUFFER_BYTES)
         return bytes(ffi.buffer(self._buffer, count))
+
+    def brown_out(self, dead_s: float) -> None:
+        """The supply is gone for `dead_s`, then the board starts anew."""
+        lib.rig_host_restart(self._host, RESET_BROWN_OUT, round(dead_s * 1000), 0)
+
+    def hang(self) -> None:
+        """The main loop stops where it is; the watchdog restarts the board."""
+        lib.rig_host_restart(self._host, RESET_WATCHDOG, WATCHDOG_MS, 1)
+
+    def corrupt_parameters(self) -> None:
+        """Flip a bit of the non-volatile memory; it is read at the next start."""
+        image = ffi.new("uint8_t[]", lib.rig_host_nonvolatile_size())
+        lib.rig_host_nonvolatile_store(self._host, image)
+        image[len(image) // 2] ^= 1
+        lib.rig_host_nonvolatile_load(self._host, image)

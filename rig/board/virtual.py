@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from rig.board.errors import BoardError
+from rig.board.injection import FaultyLine
 from rig.board.native import NativeBoard
 from rig.board.revision import firmware_revision
 from rig.board.simulated import SimulatedBoard
@@ -24,6 +25,7 @@ from rig.plant.plant import Fixture, HiddenErrors, Plant, plant_parameters
 from rig.plant.specimen import Specimen, draw_specimen
 from rig.spec.bench import BenchSpec, EmulatedBoard
 from rig.spec.bench import VirtualBench as VirtualBenchSpec
+from rig.spec.faults import FaultScript
 from rig.spec.workspace import Setup
 
 
@@ -131,6 +133,7 @@ class VirtualBench:
 
     `truth_path` is where the truth is written, if anywhere. `segment` is 0 for a new run; a
     resumed run starts at `start_s` with the same specimen and instruments but fresh noise.
+    `faults` are injected while the bench is used; `line` then tells what came of them.
     """
 
     def __init__(
@@ -141,13 +144,17 @@ class VirtualBench:
         *,
         segment: int = 0,
         start_s: float = 0.0,
+        faults: FaultScript | None = None,
     ) -> None:
         seeds = _Seeds.of(seed, segment)
         specimen = _specimen(setup, seeds)
         self.plant = _plant(setup, specimen, seeds)
         self._truth = TruthFile(truth_path) if truth_path is not None else None
         self._board = _board(setup.bench, self.plant, start_s, self._write_truth)
-        self.bus = SlcanBus(self._board)
+        self.line: FaultyLine | None = None
+        if faults is not None:
+            self.line = FaultyLine(self._board, self.plant, faults.faults, seed)
+        self.bus = SlcanBus(self.line or self._board)
         camera = VirtualCamera(
             setup.calibrations.camera,
             _virtual(setup.bench).optics,

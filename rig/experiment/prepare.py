@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from rig.experiment.errors import ExperimentError, LimitError
 from rig.experiment.plan import TRIP_MARGIN
-from rig.experiment.sweep import reach_top
+from rig.experiment.sweep import pressures_kpa, reach_top
 from rig.link.client import RigLink
 from rig.link.errors import CommandRefusedError, LinkError
 from rig.link.faults import HINTS
@@ -23,6 +23,7 @@ OFF_HOME_ML_S = 3.0
 OFF_HOME_S = 1.0
 """A jog ends by itself after half a second; the rest is for the gas to come to rest."""
 ZERO_TIMEOUT_S = 10.0
+VENTED_READING_S = 0.5
 TARE_TIMEOUT_S = 30.0
 
 BENCH_FIELDS: dict[str, str] = {
@@ -174,6 +175,14 @@ def vent(link: RigLink) -> None:
     link.expect_state(None)
     link.command("vent")
     link.await_state("idle", VENT_TIMEOUT_S)
+
+
+def vented_pressure_kpa(link: RigLink) -> float:
+    """What the transducer reads while the valve is open; raises ExperimentError if nothing."""
+    readings = pressures_kpa(link.wait(VENTED_READING_S))
+    if len(readings) == 0:
+        raise ExperimentError("no pressure telemetry came from the vented bench; check the link.")
+    return float(readings.mean())
 
 
 def make_safe(link: RigLink) -> str:

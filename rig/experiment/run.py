@@ -15,6 +15,7 @@ from rig.experiment.bench import Bench, Fixture, Observer
 from rig.experiment.errors import AbortedError
 from rig.experiment.measure import AngleMeasurement, ForceMeasurement, Measurement
 from rig.experiment.plan import Sweep
+from rig.experiment.plausible import ResponseCheck, require_zero
 from rig.experiment.prepare import (
     condition,
     leave_home,
@@ -23,6 +24,7 @@ from rig.experiment.prepare import (
     take_over,
     tare,
     vent,
+    vented_pressure_kpa,
     write_parameters,
 )
 from rig.experiment.recorder import LinkRecorder
@@ -245,6 +247,7 @@ def _sweep(
     link.wait(section.rest)
     leave_home(link)
     approach(link, left[0], section)
+    response = ResponseCheck((section.pressures.stop - section.pressures.start) / 1e3)
     for key in left:
         observer.point_began(key)
         record.event(link.now_s, "point", key.model_dump())
@@ -256,7 +259,9 @@ def _sweep(
         recorder.flush()
         record.point(point, link.now_s)
         observer.point_done(point)
+        response.add(point)
     vent(link)
+    require_zero(vented_pressure_kpa(link), section.settling.tolerance / 1e3)
 
 
 def _measurement(context: RunContext, experiment: ExperimentName) -> Measurement:

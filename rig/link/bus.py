@@ -63,6 +63,10 @@ class FrameBus(Protocol):
         """Let `duration_s` of bench time pass; return the frames received, oldest first."""
         ...
 
+    def reopen(self) -> None:
+        """Open the channel again: a board that restarted keeps silent until somebody does."""
+        ...
+
     def close(self) -> None:
         """Release the bus."""
         ...
@@ -93,12 +97,18 @@ class SlcanBus:
 
     def send(self, frame_id: int, payload: bytes) -> None:
         """Send a standard data frame."""
-        self._transport.write(slcan.encode_frame(frame_id, payload))
+        # the empty line before it ends whatever noise came since the last one
+        self._transport.write(b"\r" + slcan.encode_frame(frame_id, payload))
 
     def poll(self, duration_s: float) -> list[RawFrame]:
         """Let bench time pass; return the frames received, oldest first."""
         data = self._transport.read(duration_s)
         return self._parser.feed(data, self._transport.now_s)
+
+    def reopen(self) -> None:
+        """Open the channel again; the board's time stamps may start anew."""
+        self._parser.forget_clock()
+        self._transport.write(slcan.OPEN_WITH_TIMESTAMPS)
 
     def close(self) -> None:
         """Close the channel and the line."""
@@ -138,6 +148,9 @@ class PythonCanBus:
             if message is not None and not message.is_extended_id:
                 frames.append(RawFrame(self.now_s, message.arbitration_id, bytes(message.data)))
         return frames
+
+    def reopen(self) -> None:
+        """Nothing: a CAN adapter stays open whatever the board does."""
 
     def close(self) -> None:
         """Shut the bus down."""

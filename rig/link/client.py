@@ -30,6 +30,8 @@ POLL_S = 0.1
 """Bench time of one `receive` while nothing is urgent."""
 ACKNOWLEDGE_POLL_S = 0.02
 RESEND_S = 0.3
+REOPEN_S = 1.0
+"""After this much silence the channel is opened again: a board that restarted says why, then."""
 SILENCE_S = 2.0
 """The link counts as lost when no intact frame came for this long."""
 
@@ -110,6 +112,7 @@ class RigLink:
         self._expected_state: str | None = None
         self._last_heartbeat_s = float("-inf")
         self._last_intact_s = bus.now_s
+        self._reopened = False
         self._monitor = e2e.AliveMonitor()
         self._states = self._schema.choices("HEARTBEAT", "state")
         self._faults = self._schema.choices("HEARTBEAT", "fault_code")
@@ -185,6 +188,7 @@ class RigLink:
             return None
         self.statistics.frames += 1
         self._last_intact_s = self.now_s
+        self._reopened = False
         return Message(frame.time_s, *decoded)
 
     def _note(self, message: Message) -> None:
@@ -214,6 +218,9 @@ class RigLink:
 
     def _check_silence(self) -> None:
         silent_s = self.now_s - self._last_intact_s
+        if silent_s > REOPEN_S and not self._reopened:
+            self._reopened = True
+            self._bus.reopen()
         if silent_s > SILENCE_S:
             raise LinkLostError(
                 f"nothing intelligible came from the board at {self._bus.name} for "

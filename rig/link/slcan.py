@@ -12,6 +12,10 @@ from typing import NamedTuple
 
 TIMESTAMP_PERIOD_MS = 60_000
 CLOCK_WINDOW_MS = 10_000
+EARLIEST_MS, LATEST_MS = -100, 5_000
+"""A stamp that puts its frame further off than this is damaged: no checksum protects it."""
+MOST_DAMAGED = 10
+"""After so many such stamps in a row it is the board's clock that started anew."""
 OPEN_WITH_TIMESTAMPS = b"\rC\rS6\rZ1\rO\r"
 CLOSE = b"C\r"
 MAX_LINE = 64
@@ -35,7 +39,7 @@ class BoardClock:
     """Maps the board's time stamps to bench time, though the two clocks start and drift apart.
 
     A frame arrives some latency after its stamp; the quickest frame of the last ten to twenty
-    seconds is taken to have had none.
+    seconds is taken to have had none. A frame whose stamp cannot be has the time of its arrival.
     """
 
     def __init__(self) -> None:
@@ -43,6 +47,7 @@ class BoardClock:
         self._quickest_ms = 0.0
         self._quickest_before_ms = 0.0
         self._window_ends_ms = 0.0
+        self._damaged = 0
 
     def times_s(self, now_ms: float, stamps_ms: Sequence[int]) -> list[float]:
         """Bench times in seconds of frames that arrive now with these stamps."""
@@ -54,12 +59,26 @@ class BoardClock:
             self._window_ends_ms = now_ms + CLOCK_WINDOW_MS
         reference, half = self._reference_ms, TIMESTAMP_PERIOD_MS / 2
         late = [(ms - reference + half) % TIMESTAMP_PERIOD_MS - half for ms in apart]
+        quickest = min(self._quickest_ms, self._quickest_before_ms)
+        sound = [ms for ms in late if EARLIEST_MS <= ms - quickest <= LATEST_MS]
+        if not sound:
+            return self._doubt(now_ms, stamps_ms)
+        self._damaged = 0
         if now_ms > self._window_ends_ms:
             self._window_ends_ms = now_ms + CLOCK_WINDOW_MS
-            self._quickest_before_ms, self._quickest_ms = self._quickest_ms, min(late)
-        self._quickest_ms = min(self._quickest_ms, *late)
+            self._quickest_before_ms, self._quickest_ms = self._quickest_ms, min(sound)
+        self._quickest_ms = min(self._quickest_ms, *sound)
         quickest = min(self._quickest_ms, self._quickest_before_ms)
-        return [(now_ms - (ms - quickest)) / 1000 for ms in late]
+        return [(now_ms - (ms - quickest if ms in sound else 0.0)) / 1000 for ms in late]
+
+    def _doubt(self, now_ms: float, stamps_ms: Sequence[int]) -> list[float]:
+        """Times of frames none of whose stamps can be."""
+        self._damaged += len(stamps_ms)
+        if self._damaged <= MOST_DAMAGED:
+            return [now_ms / 1000] * len(stamps_ms)
+        self._reference_ms, self._damaged = None, 0
+        self._quickest_ms = self._quickest_before_ms = 0.0
+        return self.times_s(now_ms, stamps_ms)
 
 
 @dataclass
@@ -74,6 +93,10 @@ class SlcanParser:
     _rest: bytes = b""
     _clock: BoardClock = field(default_factory=BoardClock)
 
+    def forget_clock(self) -> None:
+        """Time stamps may start anew: the board may have."""
+        self._clock = BoardClock()
+
     def feed(self, data: bytes, now_s: float) -> list[RawFrame]:
         """Frames completed by `data`, which arrived at bench time `now_s`."""
         lines = (self._rest + data).split(b"\r")
@@ -84,9 +107,10 @@ class SlcanParser:
         frames: list[tuple[int, bytes]] = []
         stamps: list[int | None] = []
         for line in lines:
-            line = line.lstrip(b"\a\nzZ")  # replies to our own commands, bells
-            if line[:1] != b"t":
+            start = line.rfind(b"t")  # before it: replies to our own commands, bells, noise
+            if start < 0:
                 continue
+            line = line[start:]
             try:
                 frame_id = int(line[1:4], 16)
                 end = 5 + 2 * int(line[4:5], 16)

@@ -37,22 +37,40 @@ class Fixture(IntEnum):
     BLOCKED = int(lib.PLANT_BLOCKED)
 
 
+class Switch(IntEnum):
+    """What a limit switch shows."""
+
+    LIVE = int(lib.PLANT_SWITCH_LIVE)
+    STUCK_OPEN = int(lib.PLANT_SWITCH_STUCK_OPEN)
+    STUCK_CLOSED = int(lib.PLANT_SWITCH_STUCK_CLOSED)
+
+
 @dataclass(frozen=True)
 class Faults:
-    """Scripted faults of the bench; the default is healthy."""
+    """Scripted faults in SI units, as plant.h explains them; the default is healthy."""
 
-    leak_factor: float = 0.0
+    leak_conductance: float = 0.0
+    drift_rate: float = 0.0
+    spike_voltage: float = 0.0
+    lost_steps: float = 0.0
+    bad_words: float = 0.0
     sensor_open: bool = False
     sensor_short: bool = False
     sensor_stuck: bool = False
+    sensor_reversed: bool = False
+    tube_off: bool = False
+    tube_blocked: bool = False
+    home_switch: Switch = Switch.LIVE
+    end_switch: Switch = Switch.LIVE
     hx711_silent: bool = False
-    motor_stalled: bool = False
+    hx711_stuck: bool = False
+    hx711_word: int = 0
     emergency_stop: bool = False
 
 
 @dataclass(frozen=True)
 class Truth:
-    """What is really so at one instant; SI units."""
+    """What is really so at one instant; SI units, pressures gauge."""
 
     time: float
     gauge_pressure: float
@@ -62,6 +80,12 @@ class Truth:
     pushed_volume: float
     gas_moles: float
     temperature: float
+    actuator_pressure: float
+    peak_pressure: float
+    """The highest anywhere since power-on."""
+    valve_opened: float
+    """Plant time at which the closed valve was last opened; 0 if never."""
+    valve_open: bool
 
 
 @dataclass(frozen=True)
@@ -175,6 +199,10 @@ class Plant:
             t.pushed_volume,
             t.gas_moles,
             t.temperature,
+            t.actuator_pressure,
+            t.peak_pressure,
+            t.valve_opened,
+            bool(t.valve_open),
         )
 
     def save(self) -> bytes:

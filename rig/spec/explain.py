@@ -153,8 +153,12 @@ def _bounds(field: FieldInfo, unit: Unit | None) -> str:
 
 
 def unit_of(field: FieldInfo) -> Unit | None:
-    """The quantity that a field holds; None if it is something else."""
-    return next((m for m in field.metadata if isinstance(m, Unit)), None)
+    """The quantity that a field holds, or may hold; None if it is something else."""
+    metadata = list(field.metadata)
+    if get_origin(field.annotation) in (Union, types.UnionType):
+        for inner in get_args(field.annotation):
+            metadata += getattr(inner, "__metadata__", ())
+    return next((m for m in metadata if isinstance(m, Unit)), None)
 
 
 def _type_words(annotation: Any) -> str:
@@ -180,7 +184,7 @@ _TYPE_WORDS: dict[Any, str] = {
 
 def _choices(field: FieldInfo | None) -> tuple[Any, ...]:
     annotation = field.annotation if field else None
-    if get_origin(annotation) is tuple:
+    if get_origin(annotation) in (tuple, Union, types.UnionType):
         annotation = get_args(annotation)[0]
     return get_args(annotation) if get_origin(annotation) is Literal else ()
 

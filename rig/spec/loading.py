@@ -19,6 +19,7 @@ from rig.spec.calibration import (
 )
 from rig.spec.errors import Problem, SpecError
 from rig.spec.explain import did_you_mean, one_of, problems_of
+from rig.spec.faults import FaultScript
 from rig.spec.material import MaterialSpec
 from rig.spec.protocol import ProtocolSpec
 from rig.spec.published import PublishedReference
@@ -26,7 +27,13 @@ from rig.spec.tree import MAX_CHARACTERS, Tree, parse_tree
 
 AnyCalibration = TransducerCalibration | LoadCellCalibration | CameraCalibration | RulerCalibration
 AnySpec = (
-    ActuatorSpec | MaterialSpec | BenchSpec | ProtocolSpec | PublishedReference | AnyCalibration
+    ActuatorSpec
+    | MaterialSpec
+    | BenchSpec
+    | ProtocolSpec
+    | FaultScript
+    | PublishedReference
+    | AnyCalibration
 )
 
 KINDS: dict[str, type[BaseModel]] = {
@@ -34,6 +41,7 @@ KINDS: dict[str, type[BaseModel]] = {
     "material": MaterialSpec,
     "bench": BenchSpec,
     "protocol": ProtocolSpec,
+    "faults": FaultScript,
     "published": PublishedReference,
 }
 """Model of each `kind`, but for `calibration`, which depends on its `instrument`."""

@@ -69,16 +69,20 @@ def _described(schema: dict[str, Any], roots: list[type[BaseModel]]) -> dict[str
                 **definition["properties"][name],
                 "description": "; ".join(filter(None, (field.description, unit.expected))),
             }
-            if not field.is_required():
+            if field.default is not None and not field.is_required():
                 quantity["default"] = unit.in_lab_units(field.default)
-            number, text = quantity["anyOf"]
+            first, *others = quantity["anyOf"]
+            # of a quantity that may be left out, pydantic nests the quantity beside null
+            (number, text), nothing = (
+                (first["anyOf"], others) if "anyOf" in first else ([first, *others], [])
+            )
             bounds = {
                 word: unit.to_lab(bound)
                 for metadata in field.metadata
                 for key, word in _BOUNDS.items()
                 if (bound := getattr(metadata, key, None)) is not None
             }
-            quantity["anyOf"] = [{**number, **bounds}, text]
+            quantity["anyOf"] = [{**number, **bounds}, text, *nothing]
     return schema
 
 

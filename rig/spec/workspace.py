@@ -23,6 +23,7 @@ from rig.spec.calibration import (
 from rig.spec.consistency import pressure_beyond_material
 from rig.spec.errors import Problem, SpecError
 from rig.spec.explain import did_you_mean, show
+from rig.spec.faults import FaultScript
 from rig.spec.loading import AnyCalibration, Loaded, parse, parse_calibration, read, read_text
 from rig.spec.material import MaterialSpec
 from rig.spec.protocol import ProtocolSpec
@@ -34,6 +35,7 @@ FOLDERS: dict[str, str] = {
     "material": "models/materials",
     "bench": "models/benches",
     "protocol": "models/protocols",
+    "faults": "models/faults",
     "published": "models/published",
     "calibration": "calibration",
 }
@@ -201,6 +203,10 @@ class Workspace:
     def protocol(self, reference: str | Path) -> ProtocolSpec:
         """Protocol by name or path; raises SpecError."""
         return read(self.path("protocol", reference), ProtocolSpec).spec
+
+    def faults(self, reference: str | Path) -> FaultScript:
+        """Fault script by name or path; raises SpecError."""
+        return read(self.path("faults", reference), FaultScript).spec
 
     def calibration(self, reference: str | Path) -> AnyCalibration:
         """Calibration by name or path; raises SpecError."""

@@ -276,7 +276,7 @@ def test_the_actuator_is_conditioned_before_the_first_point_of_each_session(
         (Faults(sensor_short=True), "sensor_short"),
         (Faults(hx711_silent=True), "hx711_timeout"),
         (Faults(emergency_stop=True), "emergency_stop"),
-        (Faults(leak_factor=2000.0), "leak"),
+        (Faults(leak_conductance=4e-10), "leak"),
     ],
 )
 def test_a_fault_ends_the_run_vented_with_its_points_kept(

@@ -234,12 +234,31 @@ def test_a_bench_under_pressure_is_in_the_wrong_state_for(opcode: str) -> None:
 
 def test_the_same_number_is_acknowledged_again_and_not_executed_again() -> None:
     board = Board().at(2.0)
-    assert board.command("set_pressure", 3.0, number=200) == "accepted"
-    assert board.command("set_pressure", 9.0, number=200) == "accepted"
+    assert board.command("set_pressure", 3.0, number=90) == "accepted"
+    assert board.command("set_pressure", 9.0, number=90) == "accepted"
     board.run(5000)
     assert board.last("PRESSURE")["setpoint_kpa"] == pytest.approx(3.0)
-    assert board.command("vent", number=200) == "accepted"
+    assert board.command("vent", number=90) == "accepted"
     assert board.state == "run"
+
+
+@pytest.mark.parametrize(
+    ("before", "last", "stale"),
+    [((), 90, 89), ((), 90, 1), ((120, 240), 3, 255), ((120,), 240, 200)],
+)
+def test_a_command_that_comes_late_moves_nothing(
+    before: tuple[int, ...], last: int, stale: int
+) -> None:
+    board = Board().at(2.0)
+    for number in before:
+        assert board.command("none", number=number) == "accepted"
+    assert board.command("vent", number=last) == "accepted"
+    board.run(20_000)
+    assert board.state == "idle"
+    board.send("COMMAND", opcode="set_pressure", number=stale, argument=9.0)
+    board.run(500)
+    assert board.state == "idle"
+    assert board.last("HEARTBEAT")["command_number"] == last
 
 
 def test_a_refusal_is_repeated_for_the_same_number() -> None:

@@ -34,6 +34,8 @@ class ScriptedBoard:
         self.drop_commands = 0
         self.result = 0
         self.silent = False
+        self.reopened = 0
+        self.answers_when_reopened = False
         self.fault = 0
         self.state = 1
         self.schema_crc = SCHEMA.crc
@@ -94,6 +96,11 @@ class ScriptedBoard:
             )
         out, self._outbox = self._outbox, []
         return [] if self.silent else out
+
+    def reopen(self) -> None:
+        self.reopened += 1
+        if self.answers_when_reopened:
+            self.silent = False
 
     def close(self) -> None:
         self.silent = True
@@ -207,6 +214,24 @@ def test_silence_is_noticed_within_the_stated_time(board: ScriptedBoard, link: R
     with pytest.raises(LinkLostError):
         link.wait(60.0)
     assert board.now_s - start_s < 2.5
+
+
+def test_a_board_that_restarted_is_asked_once_why_it_fell_silent(
+    board: ScriptedBoard, link: RigLink
+) -> None:
+    board.silent = board.answers_when_reopened = True
+    board.fault = 13
+    with pytest.raises(BoardFaultError) as raised:
+        link.wait(60.0)
+    assert raised.value.code == "brown_out"
+    assert board.reopened == 1
+
+
+def test_the_channel_is_opened_once_in_each_silence(board: ScriptedBoard, link: RigLink) -> None:
+    board.silent = True
+    with pytest.raises(LinkLostError):
+        link.wait(60.0)
+    assert board.reopened == 1
 
 
 def test_corrupt_frames_are_dropped_and_counted(board: ScriptedBoard, link: RigLink) -> None:

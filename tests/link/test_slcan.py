@@ -84,6 +84,30 @@ def test_a_board_clock_that_drifts_100_ppm_is_followed() -> None:
         assert time_s == pytest.approx(now_ms / 1000, abs=4e-3)
 
 
+def test_a_damaged_stamp_moves_neither_its_frame_nor_the_clock() -> None:
+    parser = SlcanParser()
+    for now_ms in range(0, 2_000, 20):
+        stamped(parser, now_ms / 1000, now_ms)
+    assert stamped(parser, 2.0, 2_000 + 30_000) == [2.0]
+    assert stamped(parser, 2.02, 2_010) == pytest.approx([2.01])
+
+
+def test_a_board_that_started_anew_is_followed_again() -> None:
+    parser = SlcanParser()
+    for now_ms in range(0, 30_000, 20):
+        stamped(parser, now_ms / 1000, now_ms)
+    for now_ms in range(30_000, 31_000, 20):
+        last = stamped(parser, now_ms / 1000, now_ms - 30_000)
+    assert last == pytest.approx([30.98])
+    (late,) = stamped(parser, 31.0, 990)
+    assert late == pytest.approx(30.99)
+
+
+def test_noise_before_a_frame_does_not_lose_it() -> None:
+    (frame,) = SlcanParser().feed(b"\xff7\x00" + line(0x100, b"\x01" * 8, None), 0.0)
+    assert frame.payload == b"\x01" * 8
+
+
 def test_truncated_and_non_hexadecimal_lines_count_as_malformed() -> None:
     parser = SlcanParser()
     assert parser.feed(b"t1108001122\rtXYZ0\rt1102GG00\rz\r\r", 0.0) == []

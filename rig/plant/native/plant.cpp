@@ -54,6 +54,9 @@ struct State {
   double creep, shape_pressure;  // gauge pressures in Pa
   double held_voltage;
   double cell_creep, next_word_time;
+  double drift;  // Pa that the transducer reads too much
+  double peak_pressure, valve_opened;
+  int32_t valve_open;
   plant_fixture fixture;
   plant_faults faults;
 };
@@ -77,6 +80,7 @@ struct plant {
     return par.dead_volume + par.tube_volume + par.syringe_volume - now.pushed_volume;
   }
   double gauge() const { return now.syringe.pressure() - par.ambient_pressure; }
+  double actuator_gauge() const { return now.actuator.pressure() - par.ambient_pressure; }
   double angle() const {
     return shape(response.angle, now.fixture == PLANT_BLOCKED ? 0.0 : now.shape_pressure);
   }
@@ -85,7 +89,8 @@ struct plant {
   }
 
   plant(const plant_parameters &p, const plant_response &r, uint64_t seed)
-      : par(p), response(r), now{0, Random(seed), {}, {}, 0, 0, {}, 0, 0, 0, 0, 0, PLANT_FREE, {}} {
+      : par(p), response(r), now{0, Random(seed), {}, {}, 0, 0, {}, 0, 0, 0,
+                                0, 0, 0, 0, 0, 1, PLANT_FREE, {}} {
     now.motor_volume = now.pushed_volume = par.start_volume;
     now.syringe = at_ambient(syringe_volume());
     now.actuator = at_ambient(actuator_volume(0));
@@ -100,8 +105,8 @@ struct plant {
   }
 
   void move_plunger(const rig_pins_out &out) {
-    if (!out.motor_enabled || now.faults.motor_stalled) return;
-    now.motor_volume += out.steps * par.volume_per_step;
+    if (!out.motor_enabled) return;
+    now.motor_volume += (1.0 - now.faults.lost_steps) * out.steps * par.volume_per_step;
     // hard stops: beyond them the stepper loses steps
     now.motor_volume =
         std::min(std::max(now.motor_volume, -par.backlash_volume), par.syringe_volume);
@@ -124,38 +129,44 @@ struct plant {
     const double series = now.syringe.volume * now.actuator.volume /
                           (now.syringe.volume + now.actuator.volume);
     const double relaxation = 1.0 - std::exp(-kStep / par.heat_exchange_time);
-    const double through_tube =
-        flow_moles(now.syringe, now.syringe.pressure() - now.actuator.pressure(),
-                   par.tube_resistance, series);
-    double out_of_syringe = through_tube;
+    const bool joined = !now.faults.tube_off && !now.faults.tube_blocked;
+    double out_of_syringe = 0, into_actuator = 0;
+    if (joined) {
+      out_of_syringe = into_actuator =
+          flow_moles(now.syringe, now.syringe.pressure() - now.actuator.pressure(),
+                     par.tube_resistance, series);
+    } else if (now.faults.tube_off) {
+      out_of_syringe = flow_moles(now.syringe, gauge(), par.tube_resistance, now.syringe.volume);
+      into_actuator = -flow_moles(now.actuator, actuator_gauge(), par.tube_resistance,
+                                  now.actuator.volume);
+    }
     if (out.valve_open) {
       out_of_syringe += flow_moles(now.syringe, gauge(), par.valve_resistance, now.syringe.volume);
     }
-    const double leak_factor = now.faults.leak_factor > 0 ? now.faults.leak_factor : 1.0;
     const double leak_volume_rate =
-        par.leak_conductance * leak_factor * (now.actuator.pressure() - par.ambient_pressure);
+        (par.leak_conductance + now.faults.leak_conductance) * actuator_gauge();
     // a burst empties no further than to ambient
-    const double excess = (now.actuator.pressure() - par.ambient_pressure) * now.actuator.volume /
-                          (kGasConstant * now.actuator.temperature);
+    const double excess =
+        actuator_gauge() * now.actuator.volume / (kGasConstant * now.actuator.temperature);
     const double wanted = leak_volume_rate * kStep * par.ambient_pressure /
                           (kGasConstant * par.ambient_temperature);
     const double leaked =
         excess >= 0 ? std::min(wanted, 0.5 * excess) : std::max(wanted, 0.5 * excess);
     now.syringe.change(now.syringe.moles - out_of_syringe, syringe_volume(),
                        par.ambient_temperature, relaxation);
-    now.actuator.change(now.actuator.moles + through_tube - leaked,
+    now.actuator.change(now.actuator.moles + into_actuator - leaked,
                         actuator_volume(now.shape_pressure), par.ambient_temperature, relaxation);
   }
 
   void deform() {
-    const double gauge_actuator = now.actuator.pressure() - par.ambient_pressure;
     double played = 0;
     for (int i = 0; i < PLANT_PLAYS; ++i) {
       const double r = par.play_radius[i];
-      now.play[i] = std::min(std::max(now.play[i], gauge_actuator - r), gauge_actuator + r);
+      now.play[i] =
+          std::min(std::max(now.play[i], actuator_gauge() - r), actuator_gauge() + r);
       played += now.play[i] / PLANT_PLAYS;
     }
-    const double drive = (1 - par.play_share) * gauge_actuator + par.play_share * played;
+    const double drive = (1 - par.play_share) * actuator_gauge() + par.play_share * played;
     now.creep += (drive - now.creep) * (1.0 - std::exp(-kStep / par.creep_time));
     const double crept = (1 - par.creep_share) * drive + par.creep_share * now.creep;
     now.shape_pressure +=
@@ -163,9 +174,13 @@ struct plant {
   }
 
   void read_transducer(rig_pins_in &in) {
-    double volts = par.transducer_voltage_at_zero + gauge() / par.transducer_gain;
+    now.drift += now.faults.drift_rate * kStep;
+    const double sign = now.faults.sensor_reversed ? -1.0 : 1.0;
+    double volts =
+        par.transducer_voltage_at_zero + sign * (gauge() + now.drift) / par.transducer_gain;
     if (now.faults.sensor_stuck) volts = now.held_voltage;
     now.held_voltage = volts;
+    volts += now.faults.spike_voltage;
     if (now.faults.sensor_open) volts = 0.02;
     if (now.faults.sensor_short) volts = par.adc_reference;
     in.adc_count = kConversionsPerStep;
@@ -190,11 +205,23 @@ struct plant {
     int32_t word = static_cast<int32_t>(std::lround(counts));
     word = std::min(std::max(word, -0x800000), 0x7FFFFF);
     uint32_t bits = static_cast<uint32_t>(word) & 0xFFFFFFu;
-    if (now.random.uniform() < par.bad_word_probability) {
+    if (now.random.uniform() < std::max(par.bad_word_probability, now.faults.bad_words)) {
       bits = (bits << 1 | 1u) & 0xFFFFFFu;  // one clock too many: the word arrives shifted
     }
+    if (now.faults.hx711_stuck) bits = now.faults.hx711_word & 0xFFFFFFu;
     in.hx711_word = bits;
     in.hx711_ready = 1;
+  }
+
+  static uint8_t shown(bool pressed, int32_t fault) {
+    if (fault == PLANT_SWITCH_LIVE) return pressed;
+    return fault == PLANT_SWITCH_STUCK_CLOSED;
+  }
+
+  void keep_score(const rig_pins_out &out) {
+    now.peak_pressure = std::max({now.peak_pressure, gauge(), actuator_gauge()});
+    if (out.valve_open && !now.valve_open) now.valve_opened = now.time;
+    now.valve_open = out.valve_open != 0;
   }
 
   void step(const rig_pins_out &out, rig_pins_in &in) {
@@ -202,10 +229,13 @@ struct plant {
     move_plunger(out);
     exchange_gas(out);
     deform();
+    keep_score(out);
     read_transducer(in);
     read_load_cell(in);
-    in.home_switch = now.pushed_volume <= 0.5 * par.volume_per_step;
-    in.end_switch = now.pushed_volume >= par.syringe_volume - 0.5 * par.volume_per_step;
+    const double half_step = 0.5 * par.volume_per_step;
+    in.home_switch = shown(now.pushed_volume <= half_step, now.faults.home_switch);
+    in.end_switch =
+        shown(now.pushed_volume >= par.syringe_volume - half_step, now.faults.end_switch);
     in.emergency_stop = now.faults.emergency_stop != 0;
   }
 };
@@ -238,6 +268,10 @@ void plant_get_truth(const plant *p, plant_truth *truth) {
   truth->pushed_volume = p->now.pushed_volume;
   truth->gas_moles = p->now.syringe.moles + p->now.actuator.moles;
   truth->temperature = p->now.syringe.temperature;
+  truth->actuator_pressure = p->actuator_gauge();
+  truth->peak_pressure = p->now.peak_pressure;
+  truth->valve_opened = p->now.valve_opened;
+  truth->valve_open = p->now.valve_open;
 }
 
 size_t plant_state_size(void) { return sizeof(State); }

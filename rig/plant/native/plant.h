@@ -53,21 +53,37 @@ typedef struct {
 
 typedef enum { PLANT_FREE = 0, PLANT_BLOCKED = 1 } plant_fixture;
 
+/* How a limit switch misbehaves. */
+enum { PLANT_SWITCH_LIVE = 0, PLANT_SWITCH_STUCK_OPEN = 1, PLANT_SWITCH_STUCK_CLOSED = 2 };
+
 /* Scripted faults; zero means healthy. */
 typedef struct {
-  double leak_factor;    /* multiplies the leak; 0 and 1 mean the usual leak */
-  int32_t sensor_open;   /* transducer wire broken: input reads near zero */
-  int32_t sensor_short;  /* transducer shorted to supply */
-  int32_t sensor_stuck;  /* transducer frozen at its last voltage */
-  int32_t hx711_silent;  /* no conversions any more */
-  int32_t motor_stalled; /* pulses move nothing */
+  double leak_conductance;  /* besides the usual leak; m3/s (ambient conditions) per Pa gauge */
+  double drift_rate;        /* Pa/s by which the transducer's reading runs away */
+  double spike_voltage;     /* V on top of the transducer's */
+  double lost_steps;        /* share of the pulses that move nothing */
+  double bad_words;         /* share of the HX711's words that arrive shifted */
+  int32_t sensor_open;      /* transducer wire broken: input reads near zero */
+  int32_t sensor_short;     /* transducer shorted to supply */
+  int32_t sensor_stuck;     /* transducer frozen at its last voltage */
+  int32_t sensor_reversed;  /* its voltage falls as the pressure rises */
+  int32_t tube_off;         /* syringe and actuator both end in open air */
+  int32_t tube_blocked;     /* no gas passes between syringe and actuator */
+  int32_t home_switch, end_switch; /* PLANT_SWITCH_... */
+  int32_t hx711_silent;     /* no conversions any more */
+  int32_t hx711_stuck;      /* every word reads hx711_word */
+  uint32_t hx711_word;
   int32_t emergency_stop;
 } plant_faults;
 
-/* What is really so; never reaches the measurement path. */
+/* What is really so; never reaches the measurement path. `peak_pressure` is the highest gauge
+ * pressure anywhere since power-on; `valve_opened` and `valve_open` are of the valve output. */
 typedef struct {
   double time, gauge_pressure, angle, force, actuator_volume, pushed_volume, gas_moles;
   double temperature;
+  double actuator_pressure, peak_pressure;
+  double valve_opened; /* when the closed valve was last opened */
+  int32_t valve_open;
 } plant_truth;
 
 typedef struct plant plant;

@@ -13,6 +13,7 @@ constexpr uint16_t kSecondTicks = ticks_of_ms(1000);
 constexpr uint8_t kHeartbeatTicks = ticks_of_ms(100);
 constexpr uint8_t kPressureTicks = ticks_of_ms(20);
 constexpr uint8_t kControllerTicks = ticks_of_ms(100);
+constexpr uint8_t kCommandsAhead = 127;  // at most, of one that was lost before it
 constexpr uint16_t kJogTicks = ticks_of_ms(500);
 // With the home switch closed the plunger cannot be further in than this.
 constexpr Volume kFalseHome = ml(1.0f);
@@ -22,6 +23,12 @@ Finding boot_finding(ResetCause cause, Parameters::Image image) {
   if (cause == ResetCause::kBrownOut) return {Fault::kBrownOut, 0.0f};
   if (image == Parameters::Image::kCorrupt) return {Fault::kParametersCorrupt, 0.0f};
   return kNoFinding;
+}
+
+// Commands are numbered 1 to 255 and over again; after a start the first may have any number.
+bool behind(uint8_t number, uint8_t last) {
+  const uint8_t ahead = static_cast<uint8_t>(number >= last ? number - last : number + 255 - last);
+  return last != 0 && ahead > kCommandsAhead;
 }
 
 // Counts up to `period`, then starts over and says so.
@@ -222,9 +229,10 @@ void RigCore::handle(const CanFrame &frame) {
   }
 }
 
-// The same number again is acknowledged again and not repeated.
+// The same number again is acknowledged again and not repeated; a number that lies behind is of a
+// frame that came late or twice, and must not move anything now.
 void RigCore::handle(const Command &command) {
-  if (command.number == 0) return;
+  if (command.number == 0 || behind(command.number, command_number_)) return;
   if (command.number != command_number_) {
     command_number_ = command.number;
     command_result_ = execute(command);
