@@ -25,7 +25,7 @@ struct rig_host {
   std::vector<uint8_t> received, transmitted;
   size_t taken = 0;  // of `transmitted`
   uint64_t time_ms = 0;
-  uint32_t dead_ms = 0;
+  uint32_t held_ms = 0, dead_ms = 0;
   rig::Inputs inputs = {};
   rig_pins_out out = {};
 
@@ -37,13 +37,20 @@ struct rig_host {
 
   void boot() { core.reset(new rig::RigCore(board, nonvolatile.data())); }
 
-  void restart(rig::ResetCause cause, uint32_t dead, bool powered) {
+  void restart(rig::ResetCause cause, uint32_t held, uint32_t dead) {
     board.reset_cause = cause;
+    held_ms = held;
     dead_ms = dead;
     inputs = {};
     out.steps = 0;
-    if (!powered) out = {0, 0, 1};
     boot();
+  }
+
+  void stay_dead() {
+    --dead_ms;
+    received.clear();
+    if (held_ms > 0) --held_ms;
+    if (held_ms == 0) out = {0, 0, 1, 0};
   }
 
   void read_line() {
@@ -85,8 +92,7 @@ struct rig_host {
     bench_fn(bench, &out, &in);
     ++time_ms;
     if (dead_ms > 0) {
-      --dead_ms;
-      received.clear();
+      stay_dead();
       return;
     }
     read_line();
@@ -151,8 +157,8 @@ void rig_host_nonvolatile_store(const rig_host *host, uint8_t *image) {
   std::copy(host->nonvolatile.begin(), host->nonvolatile.end(), image);
 }
 
-void rig_host_restart(rig_host *host, uint8_t reset_cause, uint32_t dead_ms, int powered) {
-  host->restart(static_cast<rig::ResetCause>(reset_cause), dead_ms, powered != 0);
+void rig_host_restart(rig_host *host, uint8_t reset_cause, uint32_t held_ms, uint32_t dead_ms) {
+  host->restart(static_cast<rig::ResetCause>(reset_cause), held_ms, dead_ms);
 }
 
 unsigned rig_host_parameter_count(void) { return rig::Parameters::kCount; }

@@ -60,9 +60,9 @@ void rig_host_nonvolatile_load(rig_host *host, const uint8_t *image);
 void rig_host_nonvolatile_store(const rig_host *host, uint8_t *image);
 
 /* The board is dead for `dead_ms`, then starts anew with this reset cause; the non-volatile memory
- * stays. Meanwhile no step is made and no byte read. If it hangs (`powered`), the valve and the
- * motor's supply stay as they are; without power both fall off, which opens the valve. */
-void rig_host_restart(rig_host *host, uint8_t reset_cause, uint32_t dead_ms, int powered);
+ * stays. Meanwhile no step is made and no byte read. The outputs stay as they are for the first
+ * `held_ms`, then fall off, which opens the valve. */
+void rig_host_restart(rig_host *host, uint8_t reset_cause, uint32_t held_ms, uint32_t dead_ms);
 
 /* The parameter table; indices and names are those of rig.dbc. `live` parameters may be written
  * while the bench is under pressure. */

@@ -8,15 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from rig.board.disturbance import Disturbance, LineHistory, disturbance_of
-from rig.link.bus import ByteTransport
+from rig.board.simulated import SimulatedBoard
 from rig.link.schema import load_schema
 from rig.link.slcan import SlcanParser
-from rig.plant.plant import REFERENCE_LEAK_PRESSURE, Faults, Switch, Truth
+from rig.plant.plant import REFERENCE_LEAK_PRESSURE, Faults, Plant, Switch, Truth
 from rig.spec.faults import (
     AnyFault,
     BoardFault,
@@ -42,34 +41,6 @@ SUPPLY_GONE_S = 0.05
 """How long a brown-out lasts that says nothing else."""
 PRESSURISED = 0.5e3
 """Gauge pressure in Pa above which an actuator does not count as vented."""
-
-
-class BreakableBoard(ByteTransport, Protocol):
-    """A simulated board that can be made to fail."""
-
-    def brown_out(self, dead_s: float) -> None:
-        """The supply is gone for `dead_s`, then the board starts anew."""
-        ...
-
-    def hang(self) -> None:
-        """The main loop stops where it is; the watchdog restarts the board."""
-        ...
-
-    def corrupt_parameters(self) -> None:
-        """Damage the non-volatile memory; it is read at the next start."""
-        ...
-
-
-class BreakablePlant(Protocol):
-    """A simulated bench that can be broken, and that knows what is so."""
-
-    def set_faults(self, faults: Faults) -> None:
-        """Break things, or heal them."""
-        ...
-
-    def truth(self) -> Truth:
-        """What is really so now."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -145,7 +116,7 @@ class FaultyLine:
     """
 
     def __init__(
-        self, board: BreakableBoard, plant: BreakablePlant, faults: Sequence[AnyFault], seed: int
+        self, board: SimulatedBoard, plant: Plant, faults: Sequence[AnyFault], seed: int
     ) -> None:
         self._board = board
         self._plant = plant

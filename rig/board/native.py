@@ -12,8 +12,8 @@ from rig.board._firmware import ffi, lib
 from rig.board.simulated import BUFFER_BYTES, SimulatedBoard, SteppedBench
 
 RESET_POWER_ON, RESET_BROWN_OUT, RESET_WATCHDOG = 1, 3, 4
-WATCHDOG_MS = 120
-"""How long the Mega's watchdog waits for a main loop that hangs."""
+WATCHDOG_MS, RESET_AFTER_MS = 60, 120
+"""When the Mega's watchdog makes a hanging board safe, and when it restarts it."""
 
 
 class NativeBoard(SimulatedBoard):
@@ -52,11 +52,11 @@ class NativeBoard(SimulatedBoard):
 
     def brown_out(self, dead_s: float) -> None:
         """The supply is gone for `dead_s`, then the board starts anew."""
-        lib.rig_host_restart(self._host, RESET_BROWN_OUT, round(dead_s * 1000), 0)
+        lib.rig_host_restart(self._host, RESET_BROWN_OUT, 0, round(dead_s * 1000))
 
     def hang(self) -> None:
         """The main loop stops where it is; the watchdog restarts the board."""
-        lib.rig_host_restart(self._host, RESET_WATCHDOG, WATCHDOG_MS, 1)
+        lib.rig_host_restart(self._host, RESET_WATCHDOG, WATCHDOG_MS, RESET_AFTER_MS)
 
     def corrupt_parameters(self) -> None:
         """Flip a bit of the non-volatile memory; it is read at the next start."""

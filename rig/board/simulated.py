@@ -58,6 +58,18 @@ class SimulatedBoard(ABC):
             data += part
         return data
 
+    @abstractmethod
+    def brown_out(self, dead_s: float) -> None:
+        """The supply is gone for `dead_s`, then the board starts anew."""
+
+    @abstractmethod
+    def hang(self) -> None:
+        """The main loop stops where it is; the watchdog restarts the board."""
+
+    @abstractmethod
+    def corrupt_parameters(self) -> None:
+        """Flip a bit of the stored parameters; they are read at the next start."""
+
     def close(self) -> None:  # noqa: B027 (nothing to release is the rule)
         """Nothing to release."""
 

@@ -54,6 +54,15 @@ def _virtual(bench: BenchSpec) -> VirtualBenchSpec:
     return bench.virtual
 
 
+def require_simulated(bench: BenchSpec) -> None:
+    """Raise BoardError unless things may be broken on this bench."""
+    if not bench.simulated:
+        raise BoardError(
+            f"the bench '{bench.name}' has a real board: faults are injected into simulated "
+            "benches only. Nothing was moved. Choose the bench 'virtual' or 'emulated'."
+        )
+
+
 def _specimen(setup: Setup, seeds: _Seeds) -> Specimen:
     """The printed actuator that the seeds draw."""
     return draw_specimen(

@@ -6,28 +6,25 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from rig.board.virtual import require_simulated
 from rig.campaign.judge import Verdict, judge
-from rig.campaign.scenario import OpenBench, Outcome, run_scenario
+from rig.campaign.scenario import Outcome, run_scenario
 from rig.spec.faults import Expectation, FaultScript
 from rig.spec.workspace import Workspace
 
 
 class Campaign:
-    """Runs fault scripts on a bench of the workspace; the same seed gives the same verdicts."""
+    """Runs fault scripts on a bench of the workspace; the same seed gives the same verdicts.
 
-    def __init__(
-        self,
-        workspace: Workspace,
-        actuator: str,
-        bench: str,
-        seed: int,
-        open_bench: OpenBench,
-    ) -> None:
+    Raises BoardError for a real bench.
+    """
+
+    def __init__(self, workspace: Workspace, actuator: str, bench: str, seed: int) -> None:
+        require_simulated(workspace.bench(bench))
         self._workspace = workspace
         self._actuator = actuator
         self._bench = bench
         self._seed = seed
-        self._open = open_bench
         self._healthy: dict[str, Outcome] = {}
 
     def run(self, scripts: Sequence[FaultScript]) -> Iterator[Verdict]:
@@ -49,7 +46,7 @@ class Campaign:
 
     def _take(self, script: FaultScript, folder: Path) -> Outcome:
         setup = self._workspace.setup(self._actuator, self._bench, script.protocol)
-        return run_scenario(script, setup, self._seed, folder / script.name, self._open)
+        return run_scenario(script, setup, self._seed, folder / script.name)
 
 
 def unbroken(name: str, protocol: str) -> FaultScript:

@@ -6,16 +6,15 @@ The truth of the simulator is read here: this is a test of the rig, not an exper
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Literal
 
 from rig.board.injection import PRESSURISED, FaultyLine, Injection
+from rig.board.virtual import VirtualBench
 from rig.errors import RigError
-from rig.experiment.bench import Bench, Nobody
+from rig.experiment.bench import Nobody
 from rig.experiment.plan import make_plan
-from rig.experiment.prepare import board_parameters
 from rig.experiment.run import new_run
 from rig.experiment.setup import RunRequest
 from rig.mechanics.profile import cavity_volume
@@ -27,19 +26,6 @@ from rig.spec.workspace import Setup
 
 AFTERMATH_S = 30.0
 """Bench time after a run's end, without a host, before the final state is judged."""
-
-
-class BreakableBench(Bench, Protocol):
-    """A simulated bench with a fault script."""
-
-    @property
-    def line(self) -> FaultyLine | None:
-        """Where the faults are injected; None without a script."""
-        ...
-
-
-OpenBench = Callable[[Setup, int, Path, FaultScript], BreakableBench]
-"""Opens a bench: set-up, seed, where the truth is written, and what breaks."""
 
 
 @dataclass(frozen=True)
@@ -99,18 +85,15 @@ class _Told(Nobody):
         self.points.append(point)
 
 
-def run_scenario(
-    script: FaultScript, setup: Setup, seed: int, folder: Path, open_bench: OpenBench
-) -> Outcome:
-    """Take a whole run into `folder` while `script` breaks the bench."""
-    cavity = float(cavity_volume(setup.actuator.geometry, 0.0))
+def run_scenario(script: FaultScript, setup: Setup, seed: int, folder: Path) -> Outcome:
+    """Take a whole run into `folder` while `script` breaks the simulated bench."""
     request = RunRequest(
         setup=setup,
         plan=make_plan(setup.protocol, setup.actuator, setup.bench),
         seed=seed,
-        cavity_volume=cavity,
+        cavity_volume=float(cavity_volume(setup.actuator.geometry, 0.0)),
     )
-    bench = open_bench(setup, seed, folder / "truth.mcap", script)
+    bench = VirtualBench(setup, seed, folder / "truth.mcap", faults=script)
     line = bench.line
     assert line is not None, "a bench with a script has a faulty line"
     told = _Told()
@@ -131,11 +114,10 @@ def run_scenario(
     reports = [r for r in line.witness.reports if injected_s is not None and r.time_s >= injected_s]
     found = [r for r in reports if r.code != "none"]
     final_kpa = max(truth.gauge_pressure, truth.actuator_pressure) / 1e3
-    limit = board_parameters(setup.bench, setup.actuator, setup.calibrations.transducer, cavity)
     return Outcome(
         script=script,
         seed=seed,
-        limit_kpa=limit["pressure_limit_kpa"],
+        limit_kpa=request.board_parameters()["pressure_limit_kpa"],
         injected_s=injected_s,
         detected_s=_after(injected_s, found[0].time_s) if found else None,
         code=found[0].code if found else "none",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from rig.board.real import RealBench
-from rig.board.virtual import VirtualBench
+from rig.board.virtual import VirtualBench, require_simulated
 from rig.cli._interruption import catching_signals
 from rig.cli._progress import LABELS, ProgressObserver
 from rig.cli._summary import show_summary
@@ -26,6 +26,8 @@ from rig.experiment.setup import RunRequest
 from rig.mechanics.profile import cavity_volume
 from rig.record.reader import RunReader
 from rig.record.writer import require_free_folder
+from rig.spec.faults import FaultScript
+from rig.spec.loading import read
 from rig.spec.workspace import Setup, Workspace
 
 
@@ -46,6 +48,8 @@ class Session:
     request: RunRequest
     logs: Path
     console: Console
+    faults: FaultScript | None = None
+    """What breaks while the run is taken; a resumed run finds everything mended."""
 
     def show_plan(self) -> None:
         """Print what will be done, in which order, and how long it takes."""
@@ -80,7 +84,7 @@ class Session:
         """Take the whole run; returns the exit code of the command."""
         folder = out or self._free_folder()
         require_free_folder(folder)
-        bench = self._open(folder, segment=0, start_s=0.0)
+        bench = self._open(folder, segment=0, start_s=0.0, faults=self.faults)
         return self._take(
             folder,
             bench,
@@ -109,7 +113,9 @@ class Session:
             lambda observer, check: resume_run(folder, bench, self.request, observer, done, check),
         )
 
-    def _open(self, folder: Path, *, segment: int, start_s: float) -> Bench:
+    def _open(
+        self, folder: Path, *, segment: int, start_s: float, faults: FaultScript | None = None
+    ) -> Bench:
         setup = self.request.setup
         if setup.bench.simulated:
             return VirtualBench(
@@ -118,6 +124,7 @@ class Session:
                 truth_path(folder, segment),
                 segment=segment,
                 start_s=start_s,
+                faults=faults,
             )
         _require_measured_calibrations(setup)
         return RealBench(setup.bench, setup.calibrations.camera, self._ask, start_s=start_s)
@@ -163,10 +170,20 @@ class Session:
         return next(folder for folder in candidates if not folder.exists())
 
 
-def new_session(actuator: Path, bench: str, protocol: str, seed: int) -> Session:
-    """A session from spec files or names; raises SpecError and LimitError."""
+def new_session(
+    actuator: Path, bench: str, protocol: str, seed: int, faults: str | None = None
+) -> Session:
+    """A session from spec files or names; raises SpecError, LimitError and, for `faults` on a
+    real bench, BoardError.
+    """
     workspace = Workspace.find()
-    return _session(workspace.setup(actuator, bench, protocol), seed, workspace.logs)
+    session = _session(workspace.setup(actuator, bench, protocol), seed, workspace.logs)
+    if faults is None:
+        return session
+    require_simulated(session.request.setup.bench)
+    script = read(workspace.path("faults", faults), FaultScript)
+    request = replace(session.request, enclosures={"faults.yaml": script.text})
+    return replace(session, request=request, faults=script.spec)
 
 
 def resumed_session(run: Path) -> Session:

@@ -23,6 +23,10 @@ def characterise(
     seed: Annotated[
         int, typer.Option(min=0, help="Of everything random on the virtual bench.")
     ] = 1,
+    faults: Annotated[
+        str | None,
+        typer.Option(help="Break the simulated bench: name in models/faults, or a file."),
+    ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check and print the plan; move nothing.")
     ] = False,
@@ -40,7 +44,7 @@ def characterise(
     """
     from rig.cli._session import new_session
 
-    session = new_session(actuator, bench, protocol, seed)
+    session = new_session(actuator, bench, protocol, seed, faults)
     session.show_plan()
     if dry_run:
         typer.echo("Dry run: nothing was moved.")

@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 
 @app.command()
 def fault_campaign(
-    bench: Annotated[str, typer.Option(help="A simulated bench: a name or a file.")] = "virtual",
+    bench: Annotated[
+        str, typer.Option(help="`virtual`, `emulated`, or a file of a simulated bench.")
+    ] = "virtual",
     actuator: Annotated[str, typer.Option(help="Actuator: a name or a file.")] = "bellow-bending",
     only: Annotated[
         list[str] | None, typer.Option(help="Scenario of models/faults, or a file; repeatable.")
@@ -44,14 +46,12 @@ def fault_campaign(
 
     from rig.campaign.campaign import Campaign
     from rig.campaign.table import write_tables
-    from rig.cli._benches import open_simulated, require_simulated
     from rig.spec.workspace import Workspace
 
     workspace = Workspace.find()
-    require_simulated(workspace.bench(bench))
     names = only or workspace.names("faults")
     scripts = [workspace.faults(name) for name in names]
-    campaign = Campaign(workspace, actuator, bench, seed, open_simulated)
+    campaign = Campaign(workspace, actuator, bench, seed)
     console = Console()
     verdicts: list[Verdict] = []
     bar = Progress(

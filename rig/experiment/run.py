@@ -93,7 +93,8 @@ def new_run(
         versions=_versions(identity),
         parameters=parameters,
     )
-    files = {name: text.encode() for name, text in setup.attachments().items()}
+    texts = {**setup.attachments(), **request.enclosures}
+    files = {name: text.encode() for name, text in texts.items()}
     files["rig.dbc"] = load_schema().text.encode()
     context = RunContext(bench, link, request, observer)
     with (

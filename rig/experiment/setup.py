@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from rig.experiment.plan import Plan
 from rig.experiment.prepare import board_parameters, require_board_takes
@@ -20,6 +21,8 @@ class RunRequest:
     """Of the undeformed actuator in m3, for the controller's feed-forward."""
     created: str | None = None
     """ISO date and time on a real bench; None in simulated time."""
+    enclosures: Mapping[str, str] = field(default_factory=dict)
+    """Texts to attach to the log besides the specs, by file name."""
 
     def board_parameters(self) -> dict[str, float]:
         """What the board is told before it moves; raises LimitError for what it would refuse."""

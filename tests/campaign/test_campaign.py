@@ -10,13 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from rig.board.virtual import VirtualBench
 from rig.campaign.campaign import Campaign
 from rig.campaign.judge import Verdict, judge
 from rig.campaign.scenario import Outcome
 from rig.campaign.table import write_tables
 from rig.spec.faults import FaultScript
-from rig.spec.workspace import Setup, Workspace
+from rig.spec.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[2]
 LIBRARY = Workspace(ROOT)
@@ -35,16 +34,12 @@ QUICK = (
 """One of each sort; the others are behind the slow marker."""
 
 
-def open_bench(setup: Setup, seed: int, truth: Path, faults: FaultScript) -> VirtualBench:
-    return VirtualBench(setup, seed, truth, faults=faults)
-
-
 Judged = Callable[..., Verdict]
 
 
 @pytest.fixture(scope="module")
 def judged(tmp_path_factory: pytest.TempPathFactory) -> Judged:
-    campaign = Campaign(LIBRARY, "bellow-bending", "virtual", 1, open_bench)
+    campaign = Campaign(LIBRARY, "bellow-bending", "virtual", 1)
     known: dict[str, Outcome] = {}
 
     def take(script: FaultScript, *, again: bool = False) -> Verdict:
@@ -70,7 +65,7 @@ def test_a_fault_is_taken_as_required(name: str, judged: Judged) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_every_fault_is_taken_as_required(seed: int) -> None:
-    campaign = Campaign(LIBRARY, "bellow-bending", "virtual", seed, open_bench)
+    campaign = Campaign(LIBRARY, "bellow-bending", "virtual", seed)
     verdicts = campaign.run([LIBRARY.faults(name) for name in LIBRARY.names("faults")])
     assert {v.outcome.script.name: v.complaints for v in verdicts if not v.passed} == {}
 

@@ -206,3 +206,28 @@ def test_insisting_on_ctrl_c_still_vents(tmp_path: Path) -> None:
     reader = RunReader(folder)
     assert reader.complete
     assert reader.telemetry("HEARTBEAT")["valve_open"][-1] == 1
+
+
+def test_a_run_on_a_breaking_bench_fails_with_its_log_readable(
+    rig: Command, tmp_path: Path
+) -> None:
+    out = tmp_path / "run"
+    outcome = rig(
+        "characterise", "--actuator", "bellow-bending", "--protocol", "faults",
+        "--faults", "sensor-open", "--out", out,
+    )  # fmt: skip
+    assert outcome.code == 1
+    assert "sensor_open" in outcome.out
+    log = RunReader(out)
+    assert log.complete
+    assert len(log.points()) == 2
+    assert b"kind: sensor_open" in log.attachments()["faults.yaml"]
+
+
+def test_a_real_bench_is_never_broken(rig: Command, tmp_path: Path) -> None:
+    outcome = rig(
+        "characterise", "--actuator", "bellow-bending", "--bench", "mega",
+        "--faults", "sensor-open", "--out", tmp_path / "run",
+    )  # fmt: skip
+    assert outcome.code == 1
+    assert "simulated benches only" in outcome.err.replace("\n     ", " ")
