@@ -133,7 +133,8 @@ def scene_of(model: Model, solutions: Sequence[Solution], mirror: int | None) ->
 def _words(value: float, bulk: float, unit: str, peak: Peak) -> str:
     place = ", ".join(f"{1e3 * c:.3g}" for c in peak.place)
     return (
-        f"{value:.3g}{unit} at most, at ({place}) mm at rest; "
+        f"{value:.3g}{unit} at most, at ({place}) mm at rest"
+        f"{', at a notch: more on a finer mesh' if peak.at_notch else ''}; "
         f"99.5 % of the material is below {bulk:.3g}{unit}"
     )
 

@@ -24,7 +24,7 @@ def _extremes(nominal: float, strain: float) -> Extremes:
     """An incompressible pulled bar."""
 
     def peak(value: float) -> Peak:
-        return Peak(value, np.zeros(3), 0, value / 2)
+        return Peak(value, np.zeros(3), 0, False, value / 2)
 
     true = nominal * (1 + strain)
     return Extremes(10e3, peak(true), peak(true), peak(nominal), peak(strain), peak(0.0))

@@ -1,8 +1,8 @@
 """The largest stresses and strains of a solution: how much, where, and what to make of it.
 
-A maximum next to a re-entrant edge or the end of a clamp grows with every finer mesh. Beside every
-maximum stands therefore the value that 99.5 % of the material's volume stays below: it has a
-limit as the mesh is refined, singular edge or not, because the volume above a given stress has.
+A maximum next to a re-entrant edge or the end of a clamp grows with every finer mesh; it is marked
+as such. Beside every maximum stands the value that 99.5 % of the material's volume stays below:
+it has a limit as the mesh is refined, notch or not, because the volume above a given stress has.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from rig.mechanics.fe.fields import (
     von_mises,
 )
 from rig.mechanics.fe.model import Model
+from rig.mechanics.fe.notches import near_notches
 from rig.mechanics.fe.path import Solution
 
 Array = NDArray[np.float64]
@@ -42,6 +43,8 @@ class Peak:
     """Where, in m at rest, (dim,)."""
     solid: int
     """In which of the model's solids."""
+    at_notch: bool
+    """Whether it is in an element at a singular edge: then it has no limit on finer meshes."""
     bulk: float
     """Value at quadrature points that 99.5 % of the volume stays below; of all solids."""
 
@@ -84,40 +87,30 @@ def extremes_of(
     model: Model, pressure: float, inside: Sequence[PointFields], outside: Sequence[NodalFields]
 ) -> Extremes:
     """The same of fields that are known: per solid at quadrature points and at nodes."""
-    nodes = model.discretisation.nodes
-    peaks = {
-        name: _peak(
-            [measure(fields) for fields in outside],
-            [nodes[fields.nodes] for fields in outside],
-            [measure(fields) for fields in inside],
-            [fields.weights for fields in inside],
+    nodes, near = model.discretisation.nodes, near_notches(model)
+    volumes = np.concatenate([fields.weights.reshape(-1) for fields in inside])
+
+    def peak(measure: Callable[[Fields], Array]) -> Peak:
+        at_nodes = [measure(fields) for fields in outside]
+        solid = int(np.argmax([values.max() for values in at_nodes]))
+        largest = int(np.argmax(at_nodes[solid]))
+        node = int(outside[solid].nodes[largest])
+        at_points = np.concatenate([measure(fields).reshape(-1) for fields in inside])
+        return Peak(
+            value=float(at_nodes[solid][largest]),
+            place=nodes[node],
+            solid=solid,
+            at_notch=bool(near[node]),
+            bulk=volume_percentile(at_points, volumes, BULK_SHARE),
         )
-        for name, measure in _MEASURES.items()
-    }
-    return Extremes(pressure=pressure, **peaks)
 
-
-_MEASURES: dict[str, Callable[[Fields], Array]] = {
-    "von_mises": lambda fields: fields.von_mises,
-    "principal_stress": lambda fields: fields.principal_stress[0],
-    "nominal_stress": lambda fields: fields.nominal_stress[0],
-    "principal_strain": lambda fields: fields.principal_stretch[0] - 1,
-    "compression": lambda fields: 1 - fields.principal_stretch[2],
-}
-
-
-def _peak(
-    at_nodes: list[Array], places: list[Array], at_points: list[Array], weights: list[Array]
-) -> Peak:
-    solid = int(np.argmax([values.max() for values in at_nodes]))
-    node = int(np.argmax(at_nodes[solid]))
-    values = np.concatenate([v.reshape(-1) for v in at_points])
-    volumes = np.concatenate([w.reshape(-1) for w in weights])
-    return Peak(
-        value=float(at_nodes[solid][node]),
-        place=places[solid][node],
-        solid=solid,
-        bulk=volume_percentile(values, volumes, BULK_SHARE),
+    return Extremes(
+        pressure=pressure,
+        von_mises=peak(lambda fields: fields.von_mises),
+        principal_stress=peak(lambda fields: fields.principal_stress[0]),
+        nominal_stress=peak(lambda fields: fields.nominal_stress[0]),
+        principal_strain=peak(lambda fields: fields.principal_stretch[0] - 1),
+        compression=peak(lambda fields: 1 - fields.principal_stretch[2]),
     )
 
 
