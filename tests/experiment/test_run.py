@@ -105,7 +105,7 @@ def test_a_board_that_falls_idle_under_a_point_ends_the_run(tmp_path: Path) -> N
         def grab(self) -> tuple[float, bytes]:
             self._frames += 1
             if self._frames == 5:
-                idle = {"opcode": 9, "number": 200, "argument": 0.0}
+                idle = {"opcode": 9, "number": 100, "argument": 0.0}
                 frame_id, payload = load_schema().encode("COMMAND", idle)
                 self._bench.bus.send(frame_id, protect(frame_id, payload, 14))
             return self._camera.grab()
