@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+import warnings
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -100,10 +103,14 @@ def test_a_singular_matrix_is_named() -> None:
             solver.factorise(sparse.csc_array(np.zeros((3, 3)) + np.diag([1.0, 0.0, 1.0])))
 
 
-def test_unsymmetric_and_indefinite_systems_go_to_superlu_unless_pardiso_is_there() -> None:
-    names = {default_solver(s, c).name for s, c in ((False, False), (True, True))}
-    assert names in ({"SuperLU"}, {"PARDISO"})
-    assert default_solver(True, False).name in ("multifrontal", "PARDISO")
+def test_without_pardiso_only_systems_that_need_superlu_are_warned_of(monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "pypardiso", None)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert default_solver(symmetric=True, continuous_pressure=False).name == "multifrontal"
+    for symmetric, continuous in ((False, False), (True, True)):
+        with pytest.warns(RuntimeWarning, match="pypardiso is not installed"):
+            assert default_solver(symmetric, continuous).name == "SuperLU"
 
 
 def test_both_solvers_walk_the_same_path() -> None:

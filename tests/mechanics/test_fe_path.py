@@ -28,11 +28,18 @@ from rig.mechanics.fe import (
 from rig.mechanics.fe.errors import SingularError
 from rig.mechanics.fe.linear import SuperLU
 from rig.mechanics.fe.newton import Target, solve_step
-from rig.mechanics.hyperelastic import NeoHookean, QuadraticVolume
+from rig.mechanics.hyperelastic import (
+    Mode,
+    MooneyRivlin,
+    NeoHookean,
+    QuadraticVolume,
+    check_stability,
+)
 from tests.mechanics.fe_problems import bending_tube, ring
 
 KPA = 1e3
 PRESSURES = (10 * KPA, 20 * KPA, 30 * KPA)
+NEO_HOOKEAN = NeoHookean(1.0)
 SHARP = Options(tolerance=1e-9, correction=0.0)
 
 
@@ -143,12 +150,12 @@ def test_a_rigid_cap_stays_rigid_and_free_of_resultants(tube, inflated) -> None:
     assert _angles(inflated)[-1] > np.radians(1)
 
 
-def _balloon():
-    """A thick neo-Hookean sphere: its pressure has a maximum, at a bore of about 1.9."""
+def _balloon(energy=NEO_HOOKEAN):
+    """A thick sphere: neo-Hookean, its pressure has a maximum at a bore of about 1.9."""
     mesh = ring(3, 6, 1.0, 1.5)
     d = discretise(mesh, Kinematics.AXISYMMETRIC)
     supports = [Support.of(d, d.nodes_at(r=0.0), (0,)), Support.of(d, d.nodes_at(z=0.0), (1,))]
-    solid = Solid(d, NeoHookean(1.0), QuadraticVolume(1e4))
+    solid = Solid(d, energy, QuadraticVolume(1e4))
     surface = PressureSurface(d, d.facets_on("bore"))
     bore = 2 * int(d.nodes_at(r=1.0, z=0.0)[0])
     return Model(d, [solid], supports=supports, surface=surface), bore
@@ -192,6 +199,19 @@ def test_beyond_the_limit_point_pressure_control_keeps_what_it_reached_and_says_
     reached = max(s.pressure for s in result.history if s.converged)
     assert reached == pytest.approx(limit, rel=0.02)
     assert any(not s.converged for s in result.history)
+
+
+def test_an_unstable_energy_ends_the_path_where_its_check_says_and_keeps_what_was_reached() -> None:
+    energy = MooneyRivlin(0.6, -0.1)
+    (limit,) = (r.high for r in check_stability(energy).ranges if r.mode is Mode.EQUIBIAXIAL)
+    model, bore = _balloon(energy)
+    bores = np.array([1.2, 1.5, 1.9, 2.4, 3.0])
+    result = follow(model, [Point(b - 1) for b in bores], DisplacementControl((bore,)))
+    assert result.failure is not None
+    assert not result.cancelled
+    # what is stable throughout is reached; the bore stretches as the test does, the rest less
+    assert np.count_nonzero(bores < limit) <= len(result.solutions) < len(bores)
+    assert 1.5 < limit < 1.9
 
 
 def test_steps_are_cut_where_one_is_too_long() -> None:

@@ -7,6 +7,7 @@ patterns, which is fifteen times faster here than its default.
 
 from __future__ import annotations
 
+import warnings
 from typing import Any, Protocol
 
 import numpy as np
@@ -97,9 +98,18 @@ class _PardisoFactor:
 def default_solver(symmetric: bool, continuous_pressure: bool) -> LinearSolver:
     """PARDISO where pypardiso is installed; otherwise what suits the system best.
 
-    Continuous pressures make it indefinite throughout, which needs pivoting across fronts.
+    Continuous pressures make it indefinite throughout, which needs pivoting across fronts: only
+    there the missing package costs something, and a warning says so.
     """
     try:
         return Pardiso(symmetric)
     except ImportError:
-        return Multifrontal() if symmetric and not continuous_pressure else SuperLU()
+        if symmetric and not continuous_pressure:
+            return Multifrontal()
+        warnings.warn(
+            "pypardiso is not installed: SuperLU takes its place and several times as long. "
+            "Install pypardiso, or use hexahedra and a closed cavity, which need neither.",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+        return SuperLU()
