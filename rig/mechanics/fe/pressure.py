@@ -11,6 +11,7 @@ Struct. 18 (1984) 1099).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import skfem
@@ -22,6 +23,8 @@ from rig.mechanics.fe.errors import MeshError
 Array = NDArray[np.float64]
 
 _ORDER = 5
+_SIDES = {2: skfem.refdom.RefLine, 3: skfem.refdom.RefTri, 4: skfem.refdom.RefQuad}
+"""Reference cell of a side by its corners."""
 _LEVI_CIVITA = np.zeros((3, 3, 3))
 for _i, _j, _k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
     _LEVI_CIVITA[_i, _j, _k] = 1.0
@@ -75,22 +78,22 @@ class PressureSurface:
         self._axisymmetric = d.kinematics is Kinematics.AXISYMMETRIC
         self._dim = d.dim
         self.origin = np.zeros(d.dim) if origin is None else np.asarray(origin, dtype=float)
-        basis = skfem.FacetBasis(d.mesh, d.element, facets=facets, intorder=_ORDER)
-        value = np.stack(
-            [np.broadcast_to(np.asarray(b[0]), basis.dx.shape) for b in basis.basis], -1
-        )
-        slope = np.stack([np.moveaxis(b[0].grad, 0, 2) for b in basis.basis], -1)  # (f, q, dim, a)
-        # shape functions that vanish on the facet do not matter: keep those of its own nodes
-        size = np.abs(value).max(axis=1)
-        own = np.sort(np.argsort(-size, axis=1)[:, : d.facet_nodes], axis=1)
-        self._value = np.take_along_axis(value, own[:, None, :], axis=2)
-        slope = np.take_along_axis(slope, own[:, None, None, :], axis=3)
-        self.nodes = np.take_along_axis(basis.element_dofs.T.astype(np.int64), own, axis=1)
+        owners = d.mesh.f2t[0, facets]
+        local = np.argmax(d.mesh.t2f[:, owners] == facets, axis=0)
+        cell = d.mesh.elem.refdom
+        sides = [_Side.of(d.element, cell, number) for number in range(len(cell.facets))]
+        nodes = np.stack([side.nodes for side in sides])[local]
+        self.nodes = np.take_along_axis(d.connectivity[owners], nodes, axis=1)
         self.dofs = node_dofs(self.nodes, d.dim)
         self._x = d.nodes[self.nodes]  # (f, a, dim)
-        self._w = np.array(basis.dx)
-        normal = np.moveaxis(np.asarray(basis.normals), 0, -1)  # (f, q, dim)
-        self._slopes = tuple(np.einsum("fqd,fqda->fqa", t, slope) for t in _tangents(normal))
+        self._value = np.stack([side.value for side in sides])[local]
+        self._slopes = tuple(
+            np.stack([side.slopes[i] for side in sides])[local] for i in range(d.dim - 1)
+        )
+        # sides turn the wrong way round in elements that are numbered left-handed
+        centre = cell.p.mean(axis=1)[:, None]
+        turn = np.sign(d.mesh.mapping().detDF(centre, tind=owners))
+        self._w = turn * np.stack([side.weights for side in sides])[local]
         self._rest = self._evaluate(np.zeros_like(self._x))
 
     @property
@@ -165,12 +168,39 @@ class PressureSurface:
         )
 
 
-def _tangents(normal: Array) -> tuple[Array, ...]:
-    """Unit tangents with t1 x t2 = n in space, or t turned clockwise by a right angle = n."""
-    if normal.shape[-1] == 2:
-        return (np.stack((-normal[..., 1], normal[..., 0]), axis=-1),)
-    least = np.argmin(np.abs(normal), axis=-1)
-    axis = np.eye(3)[least]
-    first = np.cross(normal, axis)
-    first /= np.linalg.norm(first, axis=-1, keepdims=True)
-    return first, np.cross(normal, first)
+@dataclass(frozen=True)
+class _Side:
+    """One side of the reference cell: what its own nodes say at its quadrature points."""
+
+    nodes: Integers
+    """Local nodes on it, (a,)."""
+    value: Array
+    """Their shape functions, (q, a)."""
+    slopes: tuple[Array, ...]
+    """Derivatives along one or two directions with t1 x t2 (or t turned clockwise) outwards."""
+    weights: Array
+    """Of the quadrature points, (q,)."""
+
+    @staticmethod
+    def of(element: Any, cell: Any, number: int) -> _Side:
+        corners = cell.p[:, list(cell.facets[number])].T
+        along = _along(corners)
+        normal = np.cross(*along) if len(along) == 2 else np.array([along[0][1], -along[0][0]])
+        if normal @ (corners.mean(axis=0) - cell.p.mean(axis=1)) < 0:
+            corners = corners[::-1]
+            along = _along(corners)
+        rule = skfem.quadrature.get_quadrature(_SIDES[len(corners)], _ORDER)
+        places = corners[0][:, None] + np.stack(along, axis=1) @ rule[0]
+        shapes = [element.lbasis(places, a) for a in range(len(element.doflocs))]
+        value = np.stack([shape[0] for shape in shapes], axis=-1)
+        nodes = np.flatnonzero(np.abs(value).max(axis=0) > 1e-9)
+        slopes = tuple(
+            np.stack([t @ shape[1] for shape in shapes], axis=-1)[:, nodes] for t in along
+        )
+        return _Side(nodes, value[:, nodes], slopes, np.asarray(rule[1]))
+
+
+def _along(corners: Array) -> list[Array]:
+    """Directions from the first corner of a side to its neighbours, or along an edge."""
+    ends = (1,) if len(corners) == 2 else (1, -1)
+    return [corners[end] - corners[0] for end in ends]
