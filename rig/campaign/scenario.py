@@ -17,6 +17,7 @@ from rig.experiment.bench import Nobody
 from rig.experiment.plan import make_plan
 from rig.experiment.run import new_run
 from rig.experiment.setup import RunRequest
+from rig.mechanics.bellow import bending_geometry
 from rig.mechanics.profile import cavity_volume
 from rig.record.documents import PointDocument, PointKey
 from rig.record.errors import RecordError
@@ -87,11 +88,12 @@ class _Told(Nobody):
 
 def run_scenario(script: FaultScript, setup: Setup, seed: int, folder: Path) -> Outcome:
     """Take a whole run into `folder` while `script` breaks the simulated bench."""
+    geometry = bending_geometry(setup.actuator, "A fault campaign")
     request = RunRequest(
         setup=setup,
         plan=make_plan(setup.protocol, setup.actuator, setup.bench),
         seed=seed,
-        cavity_volume=float(cavity_volume(setup.actuator.geometry, 0.0)),
+        cavity_volume=float(cavity_volume(geometry, 0.0)),
     )
     bench = VirtualBench(setup, seed, folder / "truth.mcap", faults=script)
     line = bench.line

@@ -23,6 +23,7 @@ from rig.experiment.errors import ExperimentError
 from rig.experiment.plan import make_plan
 from rig.experiment.run import RunOutcome, new_run, resume_run
 from rig.experiment.setup import RunRequest
+from rig.mechanics.bellow import bending_geometry
 from rig.mechanics.profile import cavity_volume
 from rig.record.reader import RunReader
 from rig.record.writer import require_free_folder
@@ -197,7 +198,9 @@ def _session(setup: Setup, seed: int, logs: Path) -> Session:
         setup=setup,
         plan=make_plan(setup.protocol, setup.actuator, setup.bench),
         seed=seed,
-        cavity_volume=float(cavity_volume(setup.actuator.geometry, 0.0)),
+        cavity_volume=float(
+            cavity_volume(bending_geometry(setup.actuator, "A characterisation"), 0.0)
+        ),
         created=None
         if setup.bench.simulated
         else datetime.now().astimezone().isoformat(timespec="seconds"),

@@ -89,18 +89,20 @@ def export(
 
 
 def _model(spec: ActuatorSpec, path: Path, elements: Elements, size: str | None) -> BendingModel:
+    from rig.mechanics.bellow import bending_geometry
     from rig.mechanics.mesh.bellow_bending import mesh_bending_bellow
     from rig.mechanics.mesh.bellow_tetrahedra import mesh_bending_bellow_tetrahedra
     from rig.mechanics.simulate.bending import bending_model_on
     from rig.spec.workspace import Workspace
 
     material = Workspace.find(path).material(spec.material)
+    geometry = bending_geometry(spec, "The input deck")
     if elements is Elements.HEXAHEDRA:
         if size is not None:
             raise typer.BadParameter("--size is of tetrahedra; hexahedra follow the geometry.")
-        return bending_model_on(mesh_bending_bellow(spec.geometry), material)
+        return bending_model_on(mesh_bending_bellow(geometry), material)
     largest = None if size is None else _quantity("--size", size, "m")
-    return bending_model_on(mesh_bending_bellow_tetrahedra(spec.geometry, largest), material)
+    return bending_model_on(mesh_bending_bellow_tetrahedra(geometry, largest), material)
 
 
 def _write_deck(

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.mechanics.convolution import HalfConvolution
+from rig.mechanics.errors import MechanicsError
 from rig.mechanics.section import disc_union
-from rig.spec.actuator import BellowBendingGeometry
+from rig.spec.actuator import ActuatorSpec, BellowBendingGeometry
 
 Array = NDArray[np.float64]
 
@@ -24,6 +25,20 @@ INLET_RADIUS = 1.5e-3
 """Radius of the air inlet through the near end wall, metres (toolbox: about 1.5 mm)."""
 
 _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(48)
+
+
+def bending_geometry(actuator: ActuatorSpec, what: str) -> BellowBendingGeometry:
+    """The actuator's geometry, of the only family that `what` (start of a sentence) is for.
+
+    Raises MechanicsError for another one.
+    """
+    geometry = actuator.geometry
+    if isinstance(geometry, BellowBendingGeometry):
+        return geometry
+    raise MechanicsError(
+        f"{what} is for the family 'bellow-bending' only, but actuator '{actuator.name}' is a "
+        f"'{geometry.family}'. `rig predict` and `rig export` work for every family."
+    )
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rig.mechanics.beam import BeamTheory
+from rig.mechanics.bellow import bending_geometry
 from rig.mechanics.blocked import blocked_force
 from rig.mechanics.errors import MechanicsError
 from rig.mechanics.job import Job
@@ -29,7 +30,7 @@ def beam_of_bending_bellow(
     actuator: ActuatorSpec, material: MaterialSpec, pressures: Array, _job: Job
 ) -> Response:
     """Beam theory of the paper with our blocked force; MechanicsError where geometry runs out."""
-    geometry = actuator.geometry
+    geometry = bending_geometry(actuator, "Beam theory")
     theory = BeamTheory.of(geometry, material)
     highest = float(pressures[-1])
     if highest > theory.limit_pressure:
@@ -63,6 +64,7 @@ def finite_elements(
 _PREDICTORS: dict[tuple[str, str], Predictor] = {
     ("bellow-bending", "beam"): beam_of_bending_bellow,
     ("bellow-bending", "fe"): finite_elements,
+    ("bellow-axisymmetric", "fe"): finite_elements,
 }
 
 

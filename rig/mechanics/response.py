@@ -27,8 +27,8 @@ class Response:
     model: str
     pressure: Array
     """Gauge pressure in Pa, ascending."""
-    angle: Array
-    """Bending angle between connector and end cap in rad, tip free."""
+    angle: Array | None
+    """Bending angle between connector and end cap in rad, tip free; None of a linear actuator."""
     displacement: Array
     """Length difference between bellow and bottom layer (bending) or elongation (linear) in m."""
     blocked_force: Array | None
@@ -62,7 +62,7 @@ class Response:
         return Response(
             model=self.model,
             pressure=wanted,
-            angle=there(self.angle),
+            angle=None if self.angle is None else there(self.angle),
             displacement=there(self.displacement),
             blocked_force=None if self.blocked_force is None else there(self.blocked_force),
             volume=there(self.volume),
@@ -73,10 +73,16 @@ class Response:
     def pressure_for(self, quantity: Literal["angle", "volume"], values: ArrayLike) -> Array:
         """Pressures in Pa, (m,), at which `quantity` has `values` (rad or m3): the inverse of `at`.
 
-        Raises MechanicsError where the quantity does not grow with pressure or never gets there.
+        Raises MechanicsError where there is no such quantity, it does not grow with pressure, or
+        it never gets there.
         """
         wanted = np.atleast_1d(np.asarray(values, dtype=float))
-        values_known: Array = getattr(self, quantity)
+        values_known: Array | None = getattr(self, quantity)
+        if values_known is None:
+            raise MechanicsError(
+                f"model '{self.model}' gives no {quantity} of this actuator, so it cannot be "
+                f"controlled. Ask by pressure."
+            )
         reached = np.isfinite(values_known)
         known, pressure = values_known[reached], self.pressure[reached]
         if known.size < 2 or np.any(np.diff(known) <= 0):

@@ -28,7 +28,7 @@ def rows(response: Response) -> list[Row]:
     """One row a pressure in the order of `COLUMNS`; None where the model has no such quantity."""
     columns = (
         response.pressure / 1e3,
-        np.degrees(response.angle),
+        _scaled(response.angle, float(np.degrees(1.0))),
         response.displacement * 1e3,
         _scaled(response.blocked_force, 1 / GRAM_FORCE),
         response.volume * 1e6,

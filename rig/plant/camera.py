@@ -12,7 +12,7 @@ from rig.mechanics.profile import side_profile
 from rig.plant.layout import ProfileFunction, lay_out
 from rig.plant.optics import draw_projection
 from rig.plant.scene import Image, Light, Scene
-from rig.spec.actuator import Geometry
+from rig.spec.actuator import BellowBendingGeometry
 from rig.spec.bench import VirtualOptics
 from rig.spec.calibration import CameraCalibration, RulerCalibration
 
@@ -79,7 +79,7 @@ class VirtualCamera:
         calibration: CameraCalibration,
         optics: VirtualOptics,
         ruler: RulerCalibration,
-        geometry: Geometry,
+        geometry: BellowBendingGeometry,
         jpeg_quality: int,
         rng: np.random.Generator,
         profile: ProfileFunction = side_profile,

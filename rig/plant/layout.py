@@ -13,10 +13,10 @@ import numpy as np
 from rig.mechanics.response import SideProfile
 from rig.plant.errors import SceneError
 from rig.plant.optics import Array, Projection
-from rig.spec.actuator import Geometry
+from rig.spec.actuator import BellowBendingGeometry
 from rig.spec.calibration import RulerCalibration
 
-ProfileFunction = Callable[[Geometry, float], SideProfile]
+ProfileFunction = Callable[[BellowBendingGeometry, float], SideProfile]
 """Side profile of a geometry at a bending angle in rad."""
 
 RULER_WIDTH = 0.012
@@ -72,7 +72,10 @@ def mark_centres(corner: tuple[float, float], ruler: RulerCalibration) -> Array:
 
 
 def lay_out(
-    geometry: Geometry, ruler: RulerCalibration, projection: Projection, profile: ProfileFunction
+    geometry: BellowBendingGeometry,
+    ruler: RulerCalibration,
+    projection: Projection,
+    profile: ProfileFunction,
 ) -> Layout:
     """Place frame, actuator and ruler so that the camera sees all of them over `ANGLE_RANGE`.
 
@@ -112,7 +115,7 @@ def lay_out(
     return layout
 
 
-def _swept_outlines(geometry: Geometry, profile: ProfileFunction) -> list[Array]:
+def _swept_outlines(geometry: BellowBendingGeometry, profile: ProfileFunction) -> list[Array]:
     outlines = []
     for angle in np.linspace(*ANGLE_RANGE, 17):
         shape = profile(geometry, float(angle))

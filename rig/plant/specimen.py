@@ -33,11 +33,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from rig.mechanics.bellow import BellowShape
+from rig.mechanics.bellow import BellowShape, bending_geometry
 from rig.mechanics.model import predict
 from rig.mechanics.profile import cavity_volume, unfolding_angle
 from rig.plant.errors import SpecimenError
-from rig.spec.actuator import ActuatorSpec, Geometry
+from rig.spec.actuator import ActuatorSpec, BellowBendingGeometry
 from rig.spec.bench import SpecimenVariation
 from rig.spec.material import MaterialSpec
 
@@ -72,7 +72,7 @@ class Specimen:
     """Volume of the cavity in m3, tip free."""
     volume_blocked: Array
     """Volume of the cavity in m3, tip at the stop."""
-    geometry: Geometry
+    geometry: BellowBendingGeometry
     """As printed."""
     young_modulus: float
     """As printed, Pa."""
@@ -116,7 +116,7 @@ def draw_specimen(
     """
     deviations = np.clip(rng.standard_normal(4), -_OUTERMOST, _OUTERMOST)
     wall, modulus, offset, stiffening = deviations.tolist()
-    printed = _printed(actuator, 1 + variation.wall_thickness * wall)
+    geometry = _printed(actuator, 1 + variation.wall_thickness * wall)
     young_modulus = material.young_modulus.value * (1 + variation.young_modulus * modulus)
     strength = max(variation.stiffening * (1 + variation.stiffening_spread * stiffening), 0.0)
     at_rest = variation.gravity_offset + variation.gravity_offset_spread * offset
@@ -125,15 +125,16 @@ def draw_specimen(
     highest = max(_HIGHEST, _MARGIN * limit)
     count = int(np.ceil((highest - _LOWEST) / _STEP)) + 1
     pressure = _LOWEST + _STEP * np.arange(count, dtype=np.float64)
+    printed = actuator.model_copy(update={"geometry": geometry})
     angle_slope, force_slope = _beam_slopes(printed, _of_modulus(material, young_modulus))
     bend = stiffened(angle_slope * pressure, STIFFENING_ANGLE, strength)
     specimen = Specimen(
         pressure=pressure,
         angle=at_rest + bend,
         blocked_force=stiffened(force_slope * pressure, force_slope * limit, strength),
-        volume_free=_volume(printed.geometry, at_rest + bend),
-        volume_blocked=_volume(printed.geometry, _turn_when_blocked(printed.geometry) * bend),
-        geometry=printed.geometry,
+        volume_free=_volume(geometry, at_rest + bend),
+        volume_blocked=_volume(geometry, _turn_when_blocked(geometry) * bend),
+        geometry=geometry,
         young_modulus=young_modulus,
         gravity_offset=at_rest,
         stiffening=strength,
@@ -154,12 +155,12 @@ def stiffened(linear: Array, reference: float, strength: float) -> Array:
     return linear / (1 + strength * np.maximum(linear, 0.0) / reference)
 
 
-def _printed(actuator: ActuatorSpec, wall_factor: float) -> ActuatorSpec:
-    """The actuator with another wall, checked again: the constraints bind prints, too."""
-    geometry = actuator.geometry
+def _printed(actuator: ActuatorSpec, wall_factor: float) -> BellowBendingGeometry:
+    """The geometry with another wall, checked again: the constraints bind prints, too."""
+    geometry = bending_geometry(actuator, "The virtual bench")
     thickness = geometry.wall_thickness * wall_factor
     try:
-        as_printed = type(geometry).model_validate(
+        return BellowBendingGeometry.model_validate(
             geometry.model_dump(mode="json") | {"wall_thickness": f"{thickness!r} m"}
         )
     except ValidationError as error:
@@ -168,7 +169,6 @@ def _printed(actuator: ActuatorSpec, wall_factor: float) -> ActuatorSpec:
             f"{thickness * 1e3:.4g} mm, which is impossible: {error.errors()[0]['msg']}. Reduce "
             "'virtual.specimen.wall_thickness' in the bench file or take another seed."
         ) from None
-    return actuator.model_copy(update={"geometry": as_printed})
 
 
 def _of_modulus(material: MaterialSpec, young_modulus: float) -> MaterialSpec:
@@ -183,15 +183,15 @@ def _beam_slopes(actuator: ActuatorSpec, material: MaterialSpec) -> tuple[float,
     """
     pressure = 0.5 * actuator.limits.pressure
     response = predict(actuator, material, "beam", [pressure])
-    if response.blocked_force is None:
+    if response.angle is None or response.blocked_force is None:
         raise SpecimenError(
-            f"The beam model gives no blocked force for '{actuator.name}', so that the virtual "
-            "bench has nothing for the load cell; use another actuator family."
+            f"The beam model gives no angle or blocked force for '{actuator.name}', so that the "
+            "virtual bench has nothing for camera or load cell; use another actuator family."
         )
     return float(response.angle[0]) / pressure, float(response.blocked_force[0]) / pressure
 
 
-def _volume(geometry: Geometry, angle: Array) -> Array:
+def _volume(geometry: BellowBendingGeometry, angle: Array) -> Array:
     """Cavity volume in m3 at each angle in rad.
 
     It continues straight from shortly before the convolutions are unfolded: there the profile
@@ -205,7 +205,7 @@ def _volume(geometry: Geometry, angle: Array) -> Array:
     return volume
 
 
-def _turn_when_blocked(geometry: Geometry) -> float:
+def _turn_when_blocked(geometry: BellowBendingGeometry) -> float:
     """Angle of the tip against its stop, relative to the free angle at the same pressure."""
     shape = BellowShape.of(geometry)
     flexible, contact = shape.effective_length, shape.tip

@@ -124,7 +124,7 @@ def _ending(reader: RunReader) -> tuple[ExitStatus, str]:
 def predicted_value(response: Response, experiment: ExperimentName) -> Array | None:
     """What a model says of an experiment, in deg or grams-force; None if it says nothing."""
     if experiment == "deformation":
-        return np.degrees(response.angle)
+        return None if response.angle is None else np.degrees(response.angle)
     if response.blocked_force is None:
         return None
     return response.blocked_force / STANDARD_GRAVITY * 1e3

@@ -6,7 +6,7 @@ means mechanically lives in `rig.mechanics`.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
@@ -35,6 +35,11 @@ class BellowBendingGeometry(SpecModel):
         """Upper and lower arc radius r1 = r2 = L / (4 N) in metres."""
         return self.effective_length / (4 * self.bellow_number)
 
+    @property
+    def cavity_radius(self) -> float:
+        """Largest radius ro of the cavity in metres."""
+        return (2 - self.radius_ratio) * self.average_radius
+
     @model_validator(mode="after")
     def _constraints_of_equation_1(self) -> BellowBendingGeometry:
         problems = []
@@ -57,8 +62,66 @@ class BellowBendingGeometry(SpecModel):
         return self
 
 
-# One member until the next family lands; then `Annotated[A | B, Field(discriminator="family")]`.
-Geometry = BellowBendingGeometry
+class BellowAxisymmetricGeometry(SpecModel):
+    """Axisymmetric bellow of Auysakul et al. (Actuators 12 (2023) 300), Table 1; in metres.
+
+    It stands on its open base and lengthens. The wall is N equal arcs that bulge outwards; the
+    inner contour is the outer one moved inwards by t, measured along the radius.
+    """
+
+    family: Literal["bellow-axisymmetric"]
+    wall_thickness: Length = Field(0.003, gt=0, description="A: t, along the radius")
+    bellow_number: Count = Field(6, le=1000, description="B: N, layers of bellows")
+    divided_ratio: Ratio = Field(
+        2.0, le=1000, description="C: d = h / r, pitch over rise of an arc; 2 is a half circle"
+    )
+    top_diameter: Length = Field(0.040, gt=0, description="D1, of the top and of the base")
+    height: Length = Field(0.035, gt=0, description="H1, of the whole actuator")
+    base_height: Length = Field(0.005, gt=0, description="H2, of the fixed base")
+
+    @property
+    def pitch(self) -> float:
+        """Height h of one layer in metres (eq. 11)."""
+        return (self.height - self.base_height - self.wall_thickness) / self.bellow_number
+
+    @property
+    def rise(self) -> float:
+        """How far an arc bulges in metres, the paper's radian r (eq. 12)."""
+        return self.pitch / self.divided_ratio
+
+    @property
+    def cavity_radius(self) -> float:
+        """Largest radius of the cavity in metres."""
+        return self.top_diameter / 2 - self.wall_thickness + self.rise
+
+    @model_validator(mode="after")
+    def _describes_a_solid(self) -> BellowAxisymmetricGeometry:
+        t, radius = self.wall_thickness * 1e3, self.top_diameter * 1e3 / 2
+        room = (self.height - self.base_height) * 1e3
+        problems = []
+        if self.divided_ratio < 2 * (1 - 1e-12):
+            problems.append(
+                f"the arcs run into each other: with d = {self.divided_ratio:.4g} they are more "
+                f"than half circles; d must be at least 2 (eq. 12); increase divided_ratio"
+            )
+        if t >= radius * (1 - 1e-12):
+            problems.append(
+                f"the wall leaves no cavity: t = {t:.3g} mm must be below D1/2 = {radius:.3g} mm; "
+                f"reduce wall_thickness or increase top_diameter"
+            )
+        if t >= room * (1 - 1e-12):
+            problems.append(
+                f"the layers have no height: t = {t:.3g} mm, which the top takes, must be below "
+                f"H1 - H2 = {room:.3g} mm (eq. 11); reduce wall_thickness or base_height, or "
+                f"increase height"
+            )
+        require(not problems, "; ".join(problems))
+        return self
+
+
+Geometry = Annotated[
+    BellowBendingGeometry | BellowAxisymmetricGeometry, Field(discriminator="family")
+]
 
 
 class ActuatorLimits(SpecModel):

@@ -16,12 +16,12 @@ def pressure_beyond_material(actuator: ActuatorSpec, material: MaterialSpec) -> 
     if material.tensile_strength is None:
         return None
     geometry = actuator.geometry
-    outer_radius = (2 - geometry.radius_ratio) * geometry.average_radius
-    stress = actuator.limits.pressure * outer_radius / geometry.wall_thickness
+    radius = geometry.cavity_radius
+    stress = actuator.limits.pressure * radius / geometry.wall_thickness
     strength = material.tensile_strength.low
     if stress < strength:
         return None
-    limit = strength * geometry.wall_thickness / outer_radius
+    limit = strength * geometry.wall_thickness / radius
     return (
         f"{actuator.limits.pressure / 1e3:g} kPa would tear the wall: as a thin tube it carries "
         f"p ro / t = {stress / 1e6:.3g} MPa, {material.name} breaks from {strength / 1e6:.3g} MPa; "

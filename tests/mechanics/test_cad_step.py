@@ -11,7 +11,7 @@ from rig.mechanics.cad.brep import build, write_step
 from rig.mechanics.cad.errors import CadError
 from rig.mechanics.cad.parts import parts_of
 from rig.mechanics.mesh.bellow_axisymmetric import AxisymmetricBellow
-from rig.spec.actuator import BellowBendingGeometry
+from rig.spec.actuator import BellowAxisymmetricGeometry, BellowBendingGeometry
 
 occ = pytest.importorskip("netgen.occ", reason="netgen is not installed")
 
@@ -36,16 +36,19 @@ def test_step_files_hold_every_part_by_name_with_its_exact_volume(tmp_path):
 
 @pytest.mark.parametrize("ratio", [2.0, 3.0])
 def test_axisymmetric_solids_are_exact(ratio):
-    shape = AxisymmetricBellow(divided_ratio=ratio)
-    assert build(parts_of(shape)[0].solid).mass == pytest.approx(shape.soft_volume * 1e9, rel=1e-9)
+    geometry = BellowAxisymmetricGeometry(family="bellow-axisymmetric", divided_ratio=ratio)
+    shape = AxisymmetricBellow.of(geometry)
+    assert build(parts_of(geometry)[0].solid).mass == pytest.approx(
+        shape.soft_volume * 1e9, rel=1e-9
+    )
 
 
 def test_a_missing_folder_is_named(tmp_path):
     with pytest.raises(CadError, match="no folder"):
-        write_step(tmp_path / "nowhere" / "a.step", parts_of(AxisymmetricBellow()))
+        write_step(tmp_path / "nowhere" / "a.step", parts_of(one_convolution()))
 
 
 def test_a_missing_library_is_named_with_its_remedy(monkeypatch):
     monkeypatch.setitem(sys.modules, "netgen.occ", None)
     with pytest.raises(CadError, match="pip install netgen-mesher"):
-        build(parts_of(AxisymmetricBellow())[0].solid)
+        build(parts_of(one_convolution())[0].solid)

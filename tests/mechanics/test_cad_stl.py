@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from bellow_strategies import bending_bellows
+from bellow_strategies import axisymmetric_bellows, bending_bellows
 from hypothesis import given, settings
 
 from rig.mechanics.bellow import BellowShape
@@ -16,6 +16,7 @@ from rig.mechanics.cad.facets import triangulate
 from rig.mechanics.cad.parts import parts_of
 from rig.mechanics.cad.stl import is_watertight, printable, read_stl, volume, write_stl
 from rig.mechanics.mesh.bellow_axisymmetric import AxisymmetricBellow
+from rig.spec.actuator import BellowAxisymmetricGeometry
 
 pytest.importorskip("manifold3d", reason="manifold3d is not installed")
 
@@ -62,8 +63,9 @@ def test_the_inlet_opens_the_cavity(default_geometry):
 
 @pytest.mark.parametrize("ratio", [2.0, 3.0])
 def test_axisymmetric_bellows_stand_upright_and_keep_their_volume(ratio):
-    shape = AxisymmetricBellow(divided_ratio=ratio)
-    surface = triangulate(parts_of(shape)[0].solid)
+    geometry = BellowAxisymmetricGeometry(family="bellow-axisymmetric", divided_ratio=ratio)
+    shape = AxisymmetricBellow.of(geometry)
+    surface = triangulate(parts_of(geometry)[0].solid)
     assert is_watertight(printable(surface))
     assert volume(surface) == pytest.approx(shape.soft_volume, rel=2e-3)
     assert surface[..., 2].min() == pytest.approx(0.0)
@@ -108,3 +110,12 @@ def test_soft_parts_are_watertight_over_the_constraint_range(geometry):
     surface = triangulate(soft, 1e-2 * geometry.wall_thickness)
     assert is_watertight(printable(surface))
     assert volume(surface) == pytest.approx(BellowShape.of(geometry).soft_volume, rel=0.05)
+
+
+@settings(max_examples=8, deadline=None)
+@given(geometry=axisymmetric_bellows())
+def test_axisymmetric_soft_parts_are_watertight_over_the_constraint_range(geometry):
+    shape = AxisymmetricBellow.of(geometry)
+    surface = triangulate(parts_of(geometry)[0].solid, 1e-2 * min(shape.wall, shape.sagitta))
+    assert is_watertight(printable(surface))
+    assert volume(surface) == pytest.approx(shape.soft_volume, rel=0.05)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
 
+from rig.mechanics.errors import MechanicsError
 from rig.mechanics.model import predict
 from rig.mechanics.profile import cavity_volume
 from rig.plant.errors import SpecimenError
@@ -15,7 +16,11 @@ from rig.plant.specimen import STIFFENING_ANGLE, draw_specimen, stiffened
 from rig.spec.workspace import Workspace
 
 LIBRARY = Workspace(Path(__file__).parents[2])
-ACTUATORS = LIBRARY.names("actuator")
+ACTUATORS = [
+    name
+    for name in LIBRARY.names("actuator")
+    if LIBRARY.actuator(name).geometry.family == "bellow-bending"
+]
 TABLES = ("angle", "blocked_force", "volume_free", "volume_blocked")
 NOTHING = dict.fromkeys(
     (
@@ -62,6 +67,12 @@ def test_every_shipped_actuator_grows_strictly_with_pressure_at_several_seeds(na
         specimen = printed(actuator, material, variation, seed)
         for table in TABLES:
             assert np.all(np.diff(getattr(specimen, table)) > 0), (seed, table)
+
+
+def test_an_actuator_that_does_not_bend_is_refused_by_name(variation):
+    actuator = LIBRARY.actuator("bellow-axisymmetric")
+    with pytest.raises(MechanicsError, match="'bellow-axisymmetric'"):
+        printed(actuator, LIBRARY.material(actuator.material), variation)
 
 
 def test_the_tables_reach_from_a_slight_vacuum_to_well_above_the_limit(

@@ -17,17 +17,23 @@ from numpy.typing import NDArray
 from rig.mechanics.bellow import INLET_RADIUS, BellowShape
 from rig.mechanics.cad.construct import Arc, Combined, Line, Part, Point, Prism, Revolved
 from rig.mechanics.mesh.bellow_axisymmetric import AxisymmetricBellow
-from rig.spec.actuator import BellowBendingGeometry
+from rig.spec.actuator import BellowAxisymmetricGeometry, BellowBendingGeometry, Geometry
 
 _NO_FLANK = 1e-9
 """Flanks shorter than this are left out, metres."""
 
 
-def parts_of(geometry: BellowBendingGeometry | AxisymmetricBellow) -> tuple[Part, ...]:
+def parts_of(geometry: Geometry) -> tuple[Part, ...]:
     """All parts of an actuator, the soft one first."""
-    if isinstance(geometry, AxisymmetricBellow):
-        return (Part("soft", axisymmetric_soft_body(geometry), is_soft=True),)
-    shape = BellowShape.of(geometry)
+    match geometry:
+        case BellowBendingGeometry():
+            return _bending_parts(BellowShape.of(geometry))
+        case BellowAxisymmetricGeometry():
+            body = axisymmetric_soft_body(AxisymmetricBellow.of(geometry))
+            return (Part("soft", body, is_soft=True),)
+
+
+def _bending_parts(shape: BellowShape) -> tuple[Part, ...]:
     return (
         Part("soft", bending_soft_body(shape), is_soft=True),
         Part("connector", _connector(shape), is_soft=False),

@@ -19,15 +19,11 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import spsolve
 
-from rig.mechanics.errors import MechanicsError
 from rig.mechanics.mesh.curved import CurvedQuad
 from rig.mechanics.mesh.lattice import Block, between, join, line, transfinite
+from rig.spec.actuator import BellowAxisymmetricGeometry
 
 Array = NDArray[np.float64]
-
-
-class BellowShapeError(MechanicsError):
-    """Parameters of an axisymmetric bellow that describe no solid."""
 
 
 @dataclass(frozen=True)
@@ -47,23 +43,17 @@ class AxisymmetricBellow:
     collar: float = 0.005
     """Height of the collar."""
 
-    def __post_init__(self) -> None:
-        problems = []
-        if self.layers < 1:
-            problems.append(f"it needs at least one bellow, not {self.layers}")
-        if self.divided_ratio < 2:
-            problems.append(
-                f"the divided ratio {self.divided_ratio:g} is below 2: its arcs would be more "
-                f"than half circles and overlap their neighbours"
-            )
-        room = min(self.radius, self.height - self.collar)
-        if not 0 < self.wall < room:
-            problems.append(
-                f"the wall of {self.wall * 1e3:.3g} mm must be positive and thinner than the "
-                f"radius and the height above the collar, {room * 1e3:.3g} mm"
-            )
-        if problems:
-            raise BellowShapeError(f"This is no axisymmetric bellow: {'; '.join(problems)}.")
+    @classmethod
+    def of(cls, geometry: BellowAxisymmetricGeometry) -> AxisymmetricBellow:
+        """The dimensions of a spec, which has checked that they describe a solid."""
+        return cls(
+            wall=geometry.wall_thickness,
+            layers=geometry.bellow_number,
+            divided_ratio=geometry.divided_ratio,
+            radius=geometry.top_diameter / 2,
+            height=geometry.height,
+            collar=geometry.base_height,
+        )
 
     @property
     def pitch(self) -> float:

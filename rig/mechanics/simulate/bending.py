@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.mechanics.bellow import BellowShape
-from rig.mechanics.errors import MechanicsError
 from rig.mechanics.fe import (
     Discretisation,
     Model,
@@ -28,13 +27,13 @@ from rig.mechanics.fe import (
     rotation_vector,
 )
 from rig.mechanics.fe.model import Item
-from rig.mechanics.hyperelastic import Hyperelastic, Volumetric, hyperelastic_from
 from rig.mechanics.mesh.bellow_bending import (
     BendingBellowMesh,
     BendingResolution,
     mesh_bending_bellow,
 )
 from rig.mechanics.mesh.bellow_tetrahedra import TetrahedralBellowMesh
+from rig.mechanics.simulate.energies import mixed_energies
 from rig.spec.actuator import BellowBendingGeometry
 from rig.spec.material import MaterialSpec
 
@@ -130,10 +129,9 @@ def bending_model_on(
     items: Callable[[Discretisation, BellowShape], Sequence[Item]] | None = None,
 ) -> BendingModel:
     """The same on a mesh that is there already; `mixed` and `order` as `discretise` takes them."""
-    energies = hyperelastic_from(material)
     d = discretise(body.mesh, mixed=mixed, order=order)
     density = material.density.value
-    soft = Solid(d, energies.distortion, _volumetric(energies, material))
+    soft = Solid(d, *mixed_energies(material))
     shape = body.shape
     weight = shape.cap_mass(density if cap_density is None else cap_density) / 2
     cap = d.nodes_on("cap")
@@ -163,13 +161,3 @@ def bending_model_on(
         items=items(d, shape) if items is not None else (),
     )
     return BendingModel(model, soft, shape, body.bottom_far_edge, density, acceleration)
-
-
-def _volumetric(energies: Hyperelastic, material: MaterialSpec) -> Volumetric:
-    if energies.volume is None:
-        raise MechanicsError(
-            f"material '{material.name}': the mixed finite elements need a volumetric energy of "
-            "their own, which 'linear' and 'saint-venant-kirchhoff' do not have. Use another "
-            "'hyperelastic' energy, or leave the section out for neo-Hookean."
-        )
-    return energies.volume

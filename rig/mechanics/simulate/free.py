@@ -37,8 +37,8 @@ class ActuatorModel(Protocol):
         """Axis across whose plane through the origin the body is mirrored; None if it is whole."""
         ...
 
-    def angle(self, state: State, /) -> float:
-        """Bending angle in rad."""
+    def angle(self, state: State, /) -> float | None:
+        """Bending angle in rad; None of a family that does not bend."""
         ...
 
     def displacement(self, state: State, /) -> float:
@@ -55,7 +55,7 @@ class FreeCurves:
     """The response at the rungs that were reached, each (k,), SI units."""
 
     pressure: Array
-    angle: Array
+    angle: Array | None
     displacement: Array
     volume: Array
     max_von_mises: Array
@@ -79,7 +79,7 @@ class FreeInflation:
         stopped = str(entry["stopped"]) if count < len(self._rungs(top)) else ""
         return FreeCurves(
             pressure=entry["pressure"][:count],
-            angle=entry["angle"][:count],
+            angle=entry["angle"][:count] if "angle" in entry else None,
             displacement=entry["displacement"][:count],
             volume=entry["volume"][:count],
             max_von_mises=entry["max_von_mises"][:count],
@@ -121,9 +121,10 @@ def _entry_of(
     actuator: ActuatorModel, solutions: tuple[Solution, ...], failure: str | None, cancelled: bool
 ) -> Entry:
     states = [s.state for s in solutions]
+    angles = [angle for s in states if (angle := actuator.angle(s)) is not None]
+    bending = {"angle": np.array(angles)} if len(angles) == len(states) else {}
     return {
         "pressure": np.array([s.pressure for s in solutions]),
-        "angle": np.array([actuator.angle(s) for s in states]),
         "displacement": np.array([actuator.displacement(s) for s in states]),
         "volume": np.array([actuator.volume(s.volume) for s in solutions]),
         "max_von_mises": np.array([largest_von_mises(actuator.model, s) for s in solutions]),
@@ -137,6 +138,7 @@ def _entry_of(
         "motion": np.array([s.motion for s in states]),
         "shift": np.array([[p.shift for p in s.poses] for s in states]),
         "rotation": np.array([[p.rotation for p in s.poses] for s in states]),
+        **bending,
     } | {
         f"modes_{i}": np.array([s.points[i].pressure for s in states])
         for i in range(len(actuator.model.solids))

@@ -52,7 +52,7 @@ def finite_element_response(
     return Response(
         model="fe",
         pressure=pressures,
-        angle=at(curves.angle),
+        angle=None if curves.angle is None else at(curves.angle),
         displacement=at(curves.displacement),
         blocked_force=None,
         volume=at(curves.volume),
