@@ -14,7 +14,13 @@ from setuptools import setup
 from setuptools.command.build_py import build_py
 
 ROOT = Path(__file__).resolve().parent
-LIBRARY = ("models/**/*", "calibration/*", "firmware/rig.dbc")
+LIBRARY = (
+    "models/**/*",
+    "calibration/*",
+    "firmware/rig.dbc",
+    "firmware/Makefile",
+    "firmware/rig_mega/**/*",
+)
 
 
 def revision() -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 
 import serial
 
@@ -23,11 +24,12 @@ class SerialTransport:
         """
         self._port = port
         try:
-            self._serial = serial.serial_for_url(port, baudrate=baudrate, timeout=0)
+            # exclusive: two programs on one port would each get half of the bytes
+            self._serial = serial.serial_for_url(port, baudrate=baudrate, timeout=0, exclusive=True)
         except (serial.SerialException, ValueError, OSError) as error:
             raise PortError(
                 f"the port {port} cannot be opened ({error}). Expected a serial port with the "
-                f"board, as /dev/ttyACM0 or COM3. {_known_ports()}"
+                f"board, as /dev/ttyACM0 or COM3, that no other program uses. {_known_ports()}"
             ) from error
         self._zero_s = time.monotonic() - start_s
         if boot_s > 0:
@@ -70,6 +72,20 @@ class SerialTransport:
         return PortError(
             f"the port {self._port} vanished ({error}): was the cable pulled? The firmware's own "
             "watchdog vents the bench. Plug it in again and `rig resume` the run."
+        )
+
+
+def require_port(port: str) -> None:
+    """Raise PortError unless `port` is a serial device of this machine, and no URL."""
+    from serial.tools import list_ports
+
+    if "://" in port:
+        raise PortError(f"{port} is a URL; expected a serial port of this machine.")
+    known = {device.device for device in list_ports.comports()}
+    if port not in known and not Path(port).exists():
+        raise PortError(
+            f"there is no port {port}. Expected a serial port with the board, as /dev/ttyACM0 or "
+            f"COM3. {_known_ports()}"
         )
 
 

@@ -26,7 +26,7 @@ class ByteQueue {
 
  private:
   static constexpr uint16_t kMask = Capacity - 1;
-  uint8_t ring_[Capacity];
+  uint8_t ring_[Capacity] = {};
   uint16_t head_ = 0;
   uint16_t tail_ = 0;
 };

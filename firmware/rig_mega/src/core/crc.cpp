@@ -8,7 +8,7 @@ constexpr uint8_t kPolynomial8 = 0x1D;
 constexpr uint16_t kPolynomial16 = 0x1021;
 
 constexpr uint8_t shifted(uint8_t crc) {
-  return static_cast<uint8_t>(crc << 1 ^ (crc & 0x80 ? kPolynomial8 : 0));
+  return static_cast<uint8_t>(crc << 1 ^ ((crc & 0x80) != 0 ? kPolynomial8 : 0));
 }
 
 constexpr uint8_t nibble_remainder(uint8_t nibble) {

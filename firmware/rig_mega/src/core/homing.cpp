@@ -9,6 +9,13 @@ constexpr Volume kNear = ml(0.3f);       // from here on slowly
 constexpr Volume kClearance = ml(0.2f);  // beyond where the switch released
 constexpr Volume kReach = ml(3.0f);      // a switch further off than this is not there
 
+Homing::Progress found(PlungerMotion &motion) {
+  motion.stop_at_once();
+  motion.set_position({});
+  motion.seek_home(false);
+  return Homing::Progress::kFound;
+}
+
 }  // namespace
 
 void Homing::search(PlungerMotion &motion, const Parameters &parameters) {
@@ -32,13 +39,6 @@ void Homing::enter(Phase phase, PlungerMotion &motion, const Parameters &paramet
     case Phase::kBackOff: motion.set_velocity(fast * kSlowShare); break;
     case Phase::kSlow: motion.set_velocity(-(fast * kSlowShare)); break;
   }
-}
-
-Homing::Progress Homing::found(PlungerMotion &motion) {
-  motion.stop_at_once();
-  motion.set_position({});
-  motion.seek_home(false);
-  return Progress::kFound;
 }
 
 Homing::Progress Homing::tick(PlungerMotion &motion, const Parameters &parameters,

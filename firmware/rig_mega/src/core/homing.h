@@ -31,7 +31,6 @@ class Homing {
 
   void enter(Phase phase, PlungerMotion &motion, const Parameters &parameters);
   Progress search_switch(PlungerMotion &motion, const Parameters &parameters, bool home_switch);
-  Progress found(PlungerMotion &motion);
 
   Phase phase_ = Phase::kFast;
   Volume phase_start_ = {};

@@ -51,7 +51,7 @@ bool HostLink::receive(uint8_t byte, CanFrame &frame) {
     case slcan::Kind::kVersion: reply("V1013"); break;
     case slcan::Kind::kSerialNumber: reply("NR1G0"); break;
     case slcan::Kind::kStatus: reply("F00"); break;
-    case slcan::Kind::kBitRate: break;
+    case slcan::Kind::kBitRate:
     case slcan::Kind::kOtherFrame: break;
     case slcan::Kind::kFrame:
       reply(open_ ? "\r" : "\a");

@@ -16,6 +16,8 @@ constexpr Flow kHighestFlow = ml_s(32.767f);
 constexpr Voltage kHighestVoltage = volts(6.5535f);
 constexpr Duration kHighestAge = seconds(25.5f);
 
+constexpr uint8_t bit(bool set) { return set ? 1 : 0; }
+
 uint16_t pressure(Pressure p) {
   return rig_pressure_pressure_kpa_encode(to_kpa(clamp(p, kLowestPressure, kHighestPressure)));
 }
@@ -27,9 +29,7 @@ int16_t flow(Flow q) {
 template <typename Message>
 CanFrame packed(uint16_t id, int (*pack_it)(uint8_t *, const Message *, size_t),
                 const Message &message) {
-  CanFrame frame;
-  frame.id = id;
-  frame.length = 8;
+  CanFrame frame = {id, 8, {}};
   pack_it(frame.data, &message, sizeof frame.data);
   return frame;
 }
@@ -43,22 +43,22 @@ CanFrame pack(const Heartbeat &message) {
   m.command_number = message.command_number;
   m.command_result = static_cast<uint8_t>(message.command_result);
   m.reset_cause = message.reset_cause;
-  m.home_switch = message.home_switch;
-  m.end_switch = message.end_switch;
-  m.emergency_stop = message.emergency_stop;
-  m.valve_open = message.valve_open;
-  m.motor_enabled = message.motor_enabled;
-  m.homed = message.homed;
-  m.zeroed = message.zeroed;
-  m.tared = message.tared;
+  m.home_switch = bit(message.home_switch);
+  m.end_switch = bit(message.end_switch);
+  m.emergency_stop = bit(message.emergency_stop);
+  m.valve_open = bit(message.valve_open);
+  m.motor_enabled = bit(message.motor_enabled);
+  m.homed = bit(message.homed);
+  m.zeroed = bit(message.zeroed);
+  m.tared = bit(message.tared);
   m.uptime_s = message.uptime_s;
   return packed(RIG_HEARTBEAT_FRAME_ID, rig_heartbeat_pack, m);
 }
 
 CanFrame pack(const PressureReport &message) {
   rig_pressure_t m = {};
-  m.plausible = message.plausible;
-  m.saturated = message.saturated;
+  m.plausible = bit(message.plausible);
+  m.saturated = bit(message.saturated);
   m.pressure_kpa = pressure(message.pressure);
   m.setpoint_kpa = pressure(message.setpoint);
   m.plunger_ml =
@@ -110,20 +110,20 @@ CanFrame pack(const IdentityReport &message) {
 }
 
 Command unpack_command(const CanFrame &frame) {
-  rig_command_t m;
+  rig_command_t m = {};
   rig_command_unpack(&m, frame.data, sizeof frame.data);
   return {static_cast<Opcode>(m.opcode), m.number, m.argument};
 }
 
 ParameterRequest unpack_parameter_request(const CanFrame &frame) {
-  rig_parameter_request_t m;
+  rig_parameter_request_t m = {};
   rig_parameter_request_unpack(&m, frame.data, sizeof frame.data);
   return {static_cast<ParameterOperation>(m.operation), m.number, m.parameter_index,
           m.parameter_value};
 }
 
 uint8_t unpack_protocol_version(const CanFrame &host_heartbeat) {
-  rig_host_heartbeat_t m;
+  rig_host_heartbeat_t m = {};
   rig_host_heartbeat_unpack(&m, host_heartbeat.data, sizeof host_heartbeat.data);
   return m.protocol_version;
 }

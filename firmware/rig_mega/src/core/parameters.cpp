@@ -25,7 +25,7 @@ ParameterResult judge(uint8_t index, float value) {
 }  // namespace
 
 bool is_finite(float value) {
-  uint32_t bits;
+  uint32_t bits = 0;
   memcpy(&bits, &value, sizeof bits);
   return (bits & 0x7F800000u) != 0x7F800000u;
 }

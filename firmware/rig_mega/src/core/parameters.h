@@ -109,7 +109,7 @@ class Parameters {
   }
 
  private:
-  float values_[kCount];
+  float values_[kCount] = {};
 };
 
 static_assert(RIG_PARAMETER_PARAMETER_INDEX_HOMING_FLOW_ML_S_CHOICE == Parameters::kCount - 1,

@@ -211,7 +211,7 @@ void RigCore::follow_jog(const Inputs &inputs) {
 // --- commands ----------------------------------------------------------------------------------
 
 void RigCore::receive(uint8_t byte) {
-  CanFrame frame;
+  CanFrame frame;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled where it counts
   if (link_.receive(byte, frame)) handle(frame);
 }
 

@@ -31,9 +31,9 @@ static_assert(kOpcodes == static_cast<uint8_t>(Opcode::kIdle) + 1, "one row for 
 CommandResult permitted(Opcode opcode, State state) {
   const uint8_t row = static_cast<uint8_t>(opcode);
   if (row >= kOpcodes) return CommandResult::kUnknownOpcode;
-  if (kAllowed[row] & in(state)) return CommandResult::kAccepted;
+  if ((kAllowed[row] & in(state)) != 0) return CommandResult::kAccepted;
   if (state == State::kFault) return CommandResult::kFaulted;
-  return kSeeking & in(state) ? CommandResult::kBusy : CommandResult::kWrongState;
+  return (kSeeking & in(state)) != 0 ? CommandResult::kBusy : CommandResult::kWrongState;
 }
 
 bool Safety::valve_open() const { return state_ != State::kHold && state_ != State::kRun; }

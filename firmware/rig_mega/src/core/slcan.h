@@ -38,7 +38,7 @@ class Parser {
  private:
   Kind parse(CanFrame &frame) const;
 
-  uint8_t line_[kLongestLine];
+  uint8_t line_[kLongestLine] = {};
   uint8_t length_ = 0;
   bool too_long_ = false;
 };

@@ -33,7 +33,7 @@ inline StepSchedule schedule_steps(bool inward, float phase, float travel) {
 inline uint16_t steps_before(const StepSchedule &schedule, uint16_t timer_ticks) {
   if (schedule.count == 0 || schedule.first >= timer_ticks) return 0;
   const uint16_t passed = static_cast<uint16_t>(
-      1 + (timer_ticks - 1 - schedule.first) / (schedule.interval ? schedule.interval : 1));
+      1 + (timer_ticks - 1 - schedule.first) / (schedule.interval != 0 ? schedule.interval : 1));
   return passed < schedule.count ? passed : schedule.count;
 }
 

@@ -14,7 +14,8 @@ constexpr float kTicksPerSecond = 500;
 constexpr uint32_t ticks_of_ms(uint32_t ms) { return ms / kTickMs; }
 
 inline uint32_t ticks_of(Duration t) {
-  return static_cast<uint32_t>(to_seconds(t) * kTicksPerSecond + 0.5f);
+  // never negative, and minutes at most
+  return static_cast<uint32_t>(to_seconds(t) * kTicksPerSecond + 0.5f);  // NOLINT(bugprone-incorrect-roundings)
 }
 
 inline Duration duration_of(uint32_t ticks) {

@@ -17,6 +17,7 @@ volatile uint8_t running_count;
 
 void adc_begin() {
   DIDR0 = _BV(kPressureChannel);            // no digital input on the pin
+  // cppcheck-suppress badBitmaskCheck ; the channel happens to be 0
   ADMUX = _BV(REFS0) | kPressureChannel;    // reference AVCC
   ADCSRB = 0;
   // 125 kHz: 104 us a conversion, the fastest at full accuracy

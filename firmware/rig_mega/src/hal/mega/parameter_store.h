@@ -18,7 +18,7 @@ class ParameterStore {
 
  private:
   static constexpr uint16_t kSize = 92;
-  uint8_t image_[kSize];
+  uint8_t image_[kSize] = {};
   uint16_t next_ = kSize;
 };
 
