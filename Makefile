@@ -33,6 +33,7 @@ bench: $(READY)  ## speed figures, printed as tables
 
 slow: $(READY)  ## the checks that take minutes
 	$(BIN)/python -m pytest -m slow
+	$(MAKE) -C firmware lint coverage
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info

@@ -24,6 +24,7 @@ struct rig_host {
   std::unique_ptr<rig::RigCore> core;  // from the first millisecond on
   std::vector<uint8_t> received, transmitted;
   size_t taken = 0;  // of `transmitted`
+  size_t bytes_per_ms = SIZE_MAX, room_on_line = SIZE_MAX;
   uint64_t time_ms = 0;
   uint32_t held_ms = 0, dead_ms = 0;
   rig::Inputs inputs = {};
@@ -61,10 +62,9 @@ struct rig_host {
     received.clear();
   }
 
-  // The simulated line is as fast as needed: what is queued has been sent.
   void drain() {
     auto &queue = core->transmit_queue();
-    while (!queue.empty()) transmitted.push_back(queue.pop());
+    for (; !queue.empty() && room_on_line > 0; --room_on_line) transmitted.push_back(queue.pop());
   }
 
   void take_pins(const rig_pins_in &in) {
@@ -95,6 +95,7 @@ struct rig_host {
       stay_dead();
       return;
     }
+    room_on_line = bytes_per_ms;
     read_line();
     take_pins(in);
     const bool tick_ends = time_ms % rig::kTickMs == 0;
@@ -118,6 +119,8 @@ void rig_host_free(rig_host *host) { delete host; }
 void rig_host_receive(rig_host *host, const uint8_t *bytes, size_t count) {
   host->received.insert(host->received.end(), bytes, bytes + count);
 }
+
+void rig_host_pace_line(rig_host *host, size_t bytes_per_ms) { host->bytes_per_ms = bytes_per_ms; }
 
 uint32_t rig_host_run(rig_host *host, rig_bench_fn bench_fn, void *bench, uint32_t milliseconds,
                       int stop_on_tx) {
@@ -143,6 +146,14 @@ size_t rig_host_transmit(rig_host *host, uint8_t *out, size_t capacity) {
     host->taken = 0;
   }
   return count;
+}
+
+uint8_t rig_host_state(const rig_host *host) {
+  return static_cast<uint8_t>(host->core->safety().state());
+}
+
+float rig_host_parameter(const rig_host *host, unsigned index) {
+  return host->core->parameters().get(static_cast<uint8_t>(index));
 }
 
 uint64_t rig_host_time_ms(const rig_host *host) { return host->time_ms; }

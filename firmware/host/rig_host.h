@@ -42,6 +42,10 @@ void rig_host_free(rig_host *host);
 /* Bytes of the serial line, host to board; the board reads them in the next millisecond. */
 void rig_host_receive(rig_host *host, const uint8_t *bytes, size_t count);
 
+/* How many bytes the line takes from the board in a millisecond; 115200 baud takes 11. New boards
+ * have a line as fast as needed. */
+void rig_host_pace_line(rig_host *host, size_t bytes_per_ms);
+
 /* Runs at most `milliseconds`; returns how many were run. With `stop_on_tx` it stops after the
  * millisecond in which the board sent something. */
 uint32_t rig_host_run(rig_host *host, rig_bench_fn bench_fn, void *bench, uint32_t milliseconds,
@@ -50,6 +54,11 @@ uint32_t rig_host_run(rig_host *host, rig_bench_fn bench_fn, void *bench, uint32
 /* Bytes of the serial line, board to host: how many wait, and taking at most `capacity`. */
 size_t rig_host_pending(const rig_host *host);
 size_t rig_host_transmit(rig_host *host, uint8_t *out, size_t capacity);
+
+/* The state of the board (heartbeat of rig.dbc) and a parameter, without asking over the line; the
+ * board must have run. */
+uint8_t rig_host_state(const rig_host *host);
+float rig_host_parameter(const rig_host *host, unsigned index);
 
 uint64_t rig_host_time_ms(const rig_host *host);
 

@@ -142,7 +142,7 @@ rig_test_plunger *rig_test_plunger_new(float max_flow_ml_s, float acceleration_m
   parameters.set(RIG_PARAMETER_PARAMETER_INDEX_SYRINGE_VOLUME_ML_CHOICE, syringe_ml, kAtRest);
   auto *plunger = new rig_test_plunger;
   plunger->motion.configure(parameters);
-  plunger->motion.set_position({});
+  plunger->motion.set_home();
   return plunger;
 }
 

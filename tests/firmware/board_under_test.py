@@ -24,6 +24,12 @@ PARAMETERS = {
     .get_signal_by_name("parameter_index")
     .choices.items()
 }
+STATES = {
+    value: str(name)
+    for value, name in SCHEMA.get_message_by_name("HEARTBEAT")
+    .get_signal_by_name("state")
+    .choices.items()
+}
 ALIVE_COUNT = 15
 
 Values = dict[str, Any]
@@ -166,6 +172,7 @@ class Board:
         self.run(4)
         heartbeat = self.last("HEARTBEAT")
         assert heartbeat["command_number"] == number
+        assert STATES[lib.rig_host_state(self.host)] == self.state
         return str(heartbeat["command_result"])
 
     def parameter(self, operation: str, index: int | str, value: float = 0.0) -> Values:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 import re
 import shutil
 import subprocess
@@ -89,21 +90,86 @@ def test_the_manual_has_every_fault_with_the_unit_that_the_host_shows() -> None:
     assert {name: unit.strip() for name, unit in rows if unit.strip()} == VALUE_UNITS
 
 
-@pytest.mark.skipif(shutil.which("avr-g++") is None, reason="avr-g++ is not installed")
-@pytest.mark.skipif(not ARDUINO_CORE.exists(), reason="arduino-core-avr is not installed")
-def test_the_megas_image_compiles_without_warnings_and_fits(tmp_path: Path) -> None:
-    result = subprocess.run(
-        ["make", "-C", str(FIRMWARE), "mega", f"BUILD={tmp_path}"],
+def make(
+    target: str, *settings: str, firmware: Path = FIRMWARE
+) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        ["make", "-C", str(firmware), target, *settings],
         capture_output=True,
         text=True,
         check=False,
     )
+
+
+needs_avr = pytest.mark.skipif(
+    shutil.which("avr-g++") is None or not ARDUINO_CORE.exists(),
+    reason="gcc-avr or arduino-core-avr is not installed",
+)
+
+
+@pytest.fixture(scope="module")
+def build(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, str]:
+    """Folder of a fresh build of commit abc123, and what make printed and complained of."""
+    folder = tmp_path_factory.mktemp("mega")
+    result = make("mega", f"BUILD={folder}", "GIT=abc123")
     assert result.returncode == 0, result.stderr[-2000:]
-    assert "warning" not in result.stderr
-    flash, memory = map(int, re.findall(r"flash (\d+) .* memory (\d+) ", result.stdout)[0])
+    return folder, result.stdout, result.stderr
+
+
+@needs_avr
+def test_the_megas_image_compiles_without_warnings_and_fits(build: tuple[Path, str, str]) -> None:
+    folder, said, complained = build
+    assert "warning" not in complained
+    flash, memory = map(int, re.findall(r"flash (\d+) .* memory (\d+) ", said)[0])
     assert 0 < flash < 0.6 * 256 * 1024
     assert 0 < memory < 0.5 * 8 * 1024
-    assert (tmp_path / "rig_mega.hex").stat().st_size > flash
+    assert (folder / "rig_mega.hex").stat().st_size > flash
+
+
+@needs_avr
+@pytest.mark.parametrize("budget", ["FLASH_BUDGET=20000", "MEMORY_BUDGET=1000"])
+def test_an_image_beyond_its_budget_is_an_error(build: tuple[Path, str, str], budget: str) -> None:
+    result = make("size", f"BUILD={build[0]}", "GIT=abc123", budget)
+    assert result.returncode != 0
+    assert "beyond the budget" in result.stdout
+
+
+@needs_avr
+def test_one_commit_gives_one_image_wherever_and_whenever_it_is_built(
+    build: tuple[Path, str, str], tmp_path: Path
+) -> None:
+    elsewhere = tmp_path / "some" / "where" / "else"
+    shutil.copytree(FIRMWARE, elsewhere)
+    for source in elsewhere.rglob("*.cpp"):
+        os.utime(source, (1e9, 1e9))
+    assert make("mega", "GIT=abc123", firmware=elsewhere).returncode == 0
+    for name in ("rig_mega.hex", "rig_mega.elf"):
+        copy = tmp_path / "some" / "where" / "build" / "firmware" / name
+        assert copy.read_bytes() == (build[0] / name).read_bytes()
+
+
+@needs_avr
+def test_the_commit_is_in_the_image_and_a_new_one_is_noticed(
+    build: tuple[Path, str, str],
+) -> None:
+    folder = build[0]
+    first = (folder / "rig_mega.hex").read_bytes()
+    assert make("mega", f"BUILD={folder}", "GIT=def456").returncode == 0
+    assert (folder / "rig_mega.hex").read_bytes() != first
+    assert make("mega", f"BUILD={folder}", "GIT=abc123").returncode == 0
+    assert (folder / "rig_mega.hex").read_bytes() == first
+
+
+@needs_avr
+@pytest.mark.skipif(
+    shutil.which("arduino-builder") is None, reason="arduino-builder is not installed"
+)
+def test_the_arduino_ide_compiles_the_sketch_as_it_is(tmp_path: Path) -> None:
+    result = make("arduino", f"BUILD={tmp_path}")
+    assert result.returncode == 0, result.stderr[-2000:]
+    assert "Sketch uses" in result.stdout
+    ours = [line for line in result.stderr.splitlines() if "/sketch/" in line]
+    assert not ours  # no warning in what is ours
 
 
 def test_a_simulated_millisecond_costs_less_than_its_budget() -> None:

@@ -223,6 +223,15 @@ def test_a_fault_whose_cause_stands_is_not_cleared(scenario: Scenario) -> None:
     assert board.state == "fault"
 
 
+def test_a_pressure_still_over_the_limit_is_not_cleared() -> None:
+    board = Board().at(5.0)
+    board.bench.offset_kpa = 16.0
+    board.run(10_000)
+    assert board.fault == "over_pressure"
+    assert board.last("PRESSURE")["plausible"]
+    assert board.command("clear_fault") == "faulted"
+
+
 def test_a_fault_is_not_cleared_while_the_plunger_still_retracts() -> None:
     board, _ = broken(SCENARIOS[0])
     board.bench.offset_kpa = 0.0
@@ -422,3 +431,46 @@ def test_boot_faults_are_found_in_the_stored_parameters() -> None:
     board.run(300)
     assert (board.state, board.fault) == ("fault", "parameters_corrupt")
     assert board.command("clear_fault") == "accepted"
+
+
+def test_a_converter_that_never_starts_is_found_after_boot() -> None:
+    board = Board(conditions={"sensor": 4})
+    board.run(300)
+    assert (board.state, board.fault) == ("fault", "sensor_open")
+    assert board.bench.steps == 0
+
+
+def test_a_frozen_reading_is_no_fault_while_the_plunger_stands() -> None:
+    board = Board().at(5.0)
+    board.command("hold")
+    board.run(500)
+    board.bench.sensor = 3
+    board.run(5000)
+    assert (board.state, board.fault) == ("hold", "none")
+
+
+def test_a_home_switch_says_nothing_where_home_is_not_known() -> None:
+    board = Board()
+    board.run(200)
+    board.command("hold")
+    board.bench.home_switch_stuck = 1
+    board.run(1000)
+    assert (board.state, board.fault) == ("hold", "none")
+
+
+def test_the_end_of_travel_is_a_fault_only_where_pressure_is_missing() -> None:
+    board = Board()
+    board.write(syringe_volume_ml=4.0, setpoint_rate_kpa_s=100.0)
+    board.at(2.0)
+    board.command("set_pressure", 10.0)
+    while board.bench.plunger_ml < 3.97:
+        board.run(2)
+    board.run(100)
+    board.command("hold")
+    board.run(2000)
+    board.write(setpoint_rate_kpa_s=0.02, deadband_kpa=0.1)
+    board.command("set_pressure", 10.0)  # asks for flow at once, misses pressure after 5 s
+    board.run(4000)
+    assert (board.state, board.fault) == ("run", "none")
+    board.run(4000)
+    assert board.fault == "travel_limit"

@@ -79,9 +79,14 @@ def test_a_single_wild_word_leaves_no_trace() -> None:
     assert judged([LOAD, 3_000_000, LOAD, LOAD]) == [OK, DESYNC, OK, OK]
 
 
-def test_tare_takes_the_mean_of_twenty_words() -> None:
+def test_wild_words_that_disagree_are_all_doubted() -> None:
+    assert judged([LOAD, 3_000_000, -3_000_000, 5_000_000]) == [OK, DESYNC, DESYNC, DESYNC]
+
+
+@pytest.mark.parametrize("load", [12_345, -12_345])
+def test_tare_takes_the_mean_of_twenty_words(load: int) -> None:
     board = Board()
-    board.bench.load_cell_counts = 12_345
+    board.bench.load_cell_counts = load
     board.run(500)
     assert not board.last("HEARTBEAT")["tared"]
     board.command("tare")

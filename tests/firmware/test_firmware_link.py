@@ -158,3 +158,42 @@ def test_a_bench_in_python_sees_every_millisecond() -> None:
     board = Board()
     assert lib.rig_host_run(board.host, lib.rig_bench_in_python, ffi.NULL, 250, 0) == 250
     assert seen == [(0, 1)] * 250
+
+
+def test_a_counter_beyond_its_range_is_corrupt_even_with_the_right_crc() -> None:
+    board = Board()
+    board.run(100)
+    board.type(line_of(0x200, protected("HOST_HEARTBEAT", 15, {"protocol_version": 1})))
+    board.run(2)
+    assert board.counters.corrupt == 1
+
+
+def test_counters_stay_at_their_highest_value() -> None:
+    board = Board()
+    board.run(100)
+    board.type(b"?\r" * 65_540)
+    board.run(2)
+    assert board.counters.bad_lines == 65_535
+
+
+def test_a_line_that_is_too_slow_loses_whole_frames_and_counts_them() -> None:
+    board = Board()
+    board.run(100)
+    lib.rig_host_pace_line(board.host, 1)
+    board.run(3000)
+    assert board.counters.not_sent > 0
+    lib.rig_host_pace_line(board.host, 11)
+    lost = board.counters.not_sent
+    board.messages.clear()
+    board.run(3000)  # every line that comes is whole, and its CRC is right
+    assert board.counters.not_sent == lost
+    assert len(board.all("PRESSURE")) >= 149
+
+
+def test_a_command_without_a_number_is_no_command() -> None:
+    board = Board()
+    board.run(200)
+    board.send("COMMAND", opcode="home", number=0, argument=0.0)
+    board.run(150)
+    assert board.last("HEARTBEAT")["command_number"] == 0
+    assert board.state == "idle"

@@ -99,6 +99,22 @@ def test_geometry_and_sensors_do_not_change_under_pressure_but_gains_may(index: 
     assert str(answer["parameter_result"]) == ("accepted" if live else "wrong_state")
 
 
+def test_geometry_does_not_change_while_the_plunger_is_jogged(board: Board) -> None:
+    board.command("jog", 1.0)
+    assert board.state == "idle"
+    answer = board.parameter("write", "syringe_volume_ml", 50.0)
+    assert str(answer["parameter_result"]) == "wrong_state"
+    board.run(1500)
+    board.write(syringe_volume_ml=50.0)
+
+
+def test_an_unknown_operation_changes_nothing(board: Board) -> None:
+    for operation in range(3, 16):
+        answer = board.parameter(operation, "deadband_kpa", 0.5)
+        assert str(answer["parameter_result"]) == "unknown_parameter"
+    assert board.parameter("read", "deadband_kpa")["parameter_value"] == pytest.approx(0.008)
+
+
 def test_a_new_step_size_makes_the_home_unknown() -> None:
     board = Board().ready()
     board.write(volume_per_step_ul=0.5)
@@ -159,6 +175,15 @@ def test_an_image_of_another_version_is_not_used() -> None:
     assert (good.fault, other.fault) == ("none", "parameters_corrupt")
 
 
+def test_an_image_of_another_number_of_parameters_is_not_used() -> None:
+    values = [default(i) for i in INDICES]
+    body = bytes((1, len(values) - 1)) + struct.pack(f"<{len(values)}f", *values)
+    image = body + struct.pack("<H", lib.rig_test_crc16(body, len(body)))
+    board = Board(nonvolatile=image)
+    board.run(300)
+    assert board.fault == "parameters_corrupt"
+
+
 def test_an_image_with_a_value_out_of_range_is_not_used() -> None:
     values = [default(i) for i in INDICES]
     values[PARAMETERS["pressure_limit_kpa"]] = 500.0
@@ -175,3 +200,4 @@ def test_no_write_ever_leaves_a_value_outside_its_range(index: int, value: float
     board.parameter("write", index, value)
     held = board.parameter("read", index)["parameter_value"]
     assert low(index) <= held <= high(index)
+    assert held == lib.rig_host_parameter(board.host, index)

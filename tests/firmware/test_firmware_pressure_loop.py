@@ -118,6 +118,23 @@ def test_a_plunger_at_the_end_of_its_travel_does_not_wind_the_loop_up() -> None:
 # --- closed over the bench ----------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(
+    ("blocked", "error", "learns"), [(1, 1, 0), (1, -1, 1), (-1, -1, 0), (-1, 1, 1)]
+)
+def test_a_blocked_plunger_lets_the_loop_learn_only_what_leads_away(
+    blocked: int, error: int, learns: int
+) -> None:
+    loop = Loop().target(3.0, 3.0)
+    loop.tick(3.0 - error, blocked=blocked)
+    assert loop.saturated
+    assert (loop.integral != 0) == bool(learns)
+
+
+def test_more_plunger_than_gas_asks_for_no_flow_ahead() -> None:
+    fed = Loop(feed_forward=1.0).target(0.0, 5.0)
+    assert fed.tick(fed.setpoint + SETPOINT_RATE * TICK_S, plunger=SYSTEM_ML + 5) == 0.0
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_each_step_of_1_kpa_settles_without_overshoot_and_without_steady_error(seed: int) -> None:
     board = Board(seed).ready()

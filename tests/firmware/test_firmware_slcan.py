@@ -57,6 +57,13 @@ def test_a_time_stamp_is_four_digits_of_milliseconds() -> None:
         (b"T0000012321122", OTHER),
         (b"R000001232", OTHER),
         (b"S9", BAD),
+        (b"S!", BAD),
+        (b"Z", BAD),
+        (b"Z12", BAD),
+        (b"t1001!!", BAD),
+        (b"t1001::", BAD),
+        (b"t1001GG", BAD),
+        (b"t1001gg", BAD),
         (b"S", BAD),
         (b"Z2", BAD),
         (b"OO", BAD),
@@ -155,3 +162,22 @@ def test_the_board_survives_any_bytes_and_still_answers(data: bytes) -> None:
     board.type(data + b"\rO\r" + IDENTITY_REQUEST)
     board.run(20)
     assert board.all("IDENTITY")
+
+
+def test_frames_that_are_not_for_the_rig_are_answered_and_ignored() -> None:
+    board = Board()
+    board.run(100)
+    before = len(board.other_lines)
+    board.type(b"T0000012321122\rr1238\rS6\r")
+    board.run(2)
+    assert board.other_lines[before:] == [b""] * 3
+    assert board.counters.bad_lines == 0
+
+
+def test_time_stamps_are_switched_off_again() -> None:
+    board = Board()
+    stamped = Board(opening=b"O\rZ1\r")
+    stamped.type(b"Z0\r")
+    board.run(200)
+    stamped.run(200)
+    assert stamped.messages == board.messages

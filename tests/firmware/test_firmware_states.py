@@ -163,6 +163,32 @@ def test_vent_during_homing_goes_on_homing() -> None:
     assert board.bench.plunger_ml == pytest.approx(0.0, abs=2e-3)
 
 
+def test_vent_while_venting_goes_on_venting() -> None:
+    board = Board().at(6.0)
+    board.command("vent")
+    board.run(100)
+    assert board.command("vent") == "accepted"
+    assert board.state == "vent"
+    assert board.until("idle", 6000) < 6000
+    assert board.bench.plunger_ml == pytest.approx(0.0, abs=2e-3)
+
+
+def test_coarse_steps_come_home_too() -> None:
+    board = Board(conditions={"step_ul": 7.0})
+    board.write(volume_per_step_ul=7.0)
+    board.at(3.0)
+    board.command("vent")
+    board.until("idle", 6000)
+    assert board.fault == "none"
+    assert board.bench.plunger_ml == pytest.approx(0.0, abs=0.02)
+
+
+def test_clearing_where_no_fault_stands_changes_nothing() -> None:
+    board = Board().at(3.0)
+    assert board.command("clear_fault") == "accepted"
+    assert (board.state, board.fault) == ("run", "none")
+
+
 def test_idle_stops_everything_and_opens_the_valve() -> None:
     board = Board().at(5.0)
     assert board.command("idle") == "accepted"

@@ -11,7 +11,7 @@ constexpr Volume kReach = ml(3.0f);      // a switch further off than this is no
 
 Homing::Progress found(PlungerMotion &motion) {
   motion.stop_at_once();
-  motion.set_position({});
+  motion.set_home();
   motion.seek_home(false);
   return Homing::Progress::kFound;
 }
@@ -78,11 +78,10 @@ Homing::Progress Homing::search_switch(PlungerMotion &motion, const Parameters &
         return Progress::kWorking;
       }
       return moved > kReach ? Progress::kFailed : Progress::kWorking;
-    case Phase::kSlow:
-      if (home_switch) return found(motion);
-      return moved > kReach ? Progress::kFailed : Progress::kWorking;
+    case Phase::kSlow: break;
   }
-  return Progress::kFailed;
+  if (home_switch) return found(motion);
+  return moved > kReach ? Progress::kFailed : Progress::kWorking;
 }
 
 }  // namespace rig

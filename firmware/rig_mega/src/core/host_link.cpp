@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "count.h"
 #include "generated/rig.h"
 #include "tick.h"
 
@@ -23,11 +24,6 @@ uint8_t index_of(uint16_t id, const uint16_t (&ids)[Count]) {
   uint8_t i = 0;
   while (i < Count && ids[i] != id) ++i;
   return i;
-}
-
-// Counters stay at their highest value rather than start over.
-void count(uint16_t &counter) {
-  if (counter != 0xFFFF) ++counter;
 }
 
 }  // namespace
@@ -70,8 +66,9 @@ bool HostLink::accept(const CanFrame &frame) {
   switch (checks_[i].judge(frame)) {
     case Reception::kFresh: return true;
     case Reception::kCorrupt: count(counters_.corrupt); return false;
-    case Reception::kRepeated: count(counters_.repeated); return false;
+    case Reception::kRepeated: break;
   }
+  count(counters_.repeated);
   return false;
 }
 

@@ -31,9 +31,7 @@ class HostLink {
 
   void tick();
 
-  bool open() const { return open_; }
   TransmitQueue &transmit_queue() { return transmit_; }
-  const TransmitQueue &transmit_queue() const { return transmit_; }
   const LinkCounters &counters() const { return counters_; }
 
  private:

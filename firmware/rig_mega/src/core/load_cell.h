@@ -54,7 +54,6 @@ class LoadCell {
   bool silent(Duration timeout) const { return connected_ && silent_ticks_ > ticks_of(timeout); }
 
   void begin_tare() { tare_.begin(); }
-  void abandon_tare() { tare_.abandon(); }
   bool tared() const { return tare_.done(); }
 
   // Begins a new judgement after a fault.

@@ -11,9 +11,6 @@ namespace {
 // What the step interrupt of the Mega can give, whatever the parameters say.
 constexpr float kMaxStepsPerTick = 48;  // 24 kHz
 
-// Rounded away from zero.
-int32_t nearest(float x) { return static_cast<int32_t>(x < 0 ? x - 0.5f : x + 0.5f); }
-
 }  // namespace
 
 void PlungerMotion::configure(const Parameters &parameters) {
@@ -46,9 +43,8 @@ void PlungerMotion::stop_at_once() {
   velocity_ = {};
 }
 
-void PlungerMotion::set_position(Volume position) {
-  const float steps = position / per_step_;
-  steps_ = nearest(steps);
+void PlungerMotion::set_home() {
+  steps_ = 0;
   fraction_ = 0;
   homed_ = true;
   update_position();
@@ -59,8 +55,7 @@ void PlungerMotion::update_position() {
 }
 
 bool PlungerMotion::arrived() const {
-  if (moving()) return false;
-  return mode_ == Mode::kVelocity || magnitude(target_ - position()) <= per_step_;
+  return !moving() && magnitude(target_ - position()) <= per_step_;
 }
 
 // The speed from which the plunger can still stop within `distance`, in steps of one tick:

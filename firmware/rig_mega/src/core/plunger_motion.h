@@ -21,8 +21,8 @@ class PlungerMotion {
   void stop() { set_velocity({}); }              // brake within the acceleration limit
   void stop_at_once();                           // give up steps still owed
 
-  // The present position becomes `position`; the ends of travel hold from now on.
-  void set_position(Volume position);
+  // Here is home; the ends of travel hold from now on.
+  void set_home();
   void forget_home() { homed_ = false; }
   // While seeking home the outer end of travel is where the switch says.
   void seek_home(bool seeking) { seeking_home_ = seeking; }
@@ -34,7 +34,7 @@ class PlungerMotion {
   Volume position() const { return position_; }
   Flow velocity() const { return velocity_; }
   bool moving() const { return magnitude(velocity_) > Flow{}; }
-  // At the target of move_to, or at rest after stop.
+  // At rest at the target of move_to.
   bool arrived() const;
   // +1 or -1 while the end of travel holds the plunger back from moving in or out, else 0.
   int8_t blocked() const { return blocked_; }

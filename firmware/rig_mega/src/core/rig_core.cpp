@@ -1,5 +1,6 @@
 #include "rig_core.h"
 
+#include "count.h"
 #include "generated/rig.h"
 #include "generated/schema.h"
 #include "tick.h"
@@ -142,7 +143,7 @@ void RigCore::react_to(const Finding &finding) {
   }
   if (!safety_.latch(finding)) return;
   enter(State::kFault);
-  retracting_ = plunger_may_retract(finding.fault) && motion_.homed() && outputs_.motor_enabled;
+  retracting_ = plunger_may_retract(finding.fault) && motion_.homed();
   if (retracting_) homing_.go_back(motion_, parameters_);
   fault_report_ticks_ = 0;
   send_fault();
@@ -222,10 +223,8 @@ void RigCore::handle(const CanFrame &frame) {
       break;
     case RIG_COMMAND_FRAME_ID: handle(unpack_command(frame)); break;
     case RIG_PARAMETER_REQUEST_FRAME_ID: handle(unpack_parameter_request(frame)); break;
-    case RIG_IDENTITY_REQUEST_FRAME_ID:
+    default:  // the link lets four through, of which this is RIG_IDENTITY_REQUEST_FRAME_ID
       link_.send(pack(IdentityReport{board_.kind, board_.firmware_git}));
-      break;
-    default: break;
   }
 }
 
@@ -356,7 +355,7 @@ void RigCore::load_cell_word(uint32_t word) {
 }
 
 void RigCore::report() {
-  if (every(kSecondTicks, second_ticks_) && uptime_s_ != 0xFFFF) ++uptime_s_;
+  if (every(kSecondTicks, second_ticks_)) count(uptime_s_);
   if (every(kPressureTicks, pressure_ticks_)) send_pressure();
   if (every(kHeartbeatTicks, heartbeat_ticks_)) send_heartbeat();
   if (every(kControllerTicks, controller_ticks_)) send_controller();

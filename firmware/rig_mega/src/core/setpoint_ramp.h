@@ -22,7 +22,6 @@ class SetpointRamp {
   }
 
   Pressure value() const { return value_; }
-  Pressure target() const { return target_; }
   PressureRate rate() const { return rate_; }
   bool resting() const { return magnitude(target_ - value_) < kpa(1e-5f); }
 

@@ -17,10 +17,9 @@ struct StepSchedule {
 constexpr StepSchedule kNoSteps = {false, 0, 0, 0};
 
 // `phase` in (-1, 1) is the part of a step already travelled in the direction of motion (negative
-// after a reversal), `travel` the positive distance of this tick in steps.
+// after a reversal), `travel` the positive distance of this tick in steps; together at least one step.
 inline StepSchedule schedule_steps(bool inward, float phase, float travel) {
   const float end = phase + travel;
-  if (end < 1.0f) return {inward, 0, 0, 0};
   const uint16_t count = static_cast<uint16_t>(end);
   const float interval = static_cast<float>(kTimerTicksPerTick) / travel;
   const float first = (1.0f - phase) * interval;
@@ -32,8 +31,8 @@ inline StepSchedule schedule_steps(bool inward, float phase, float travel) {
 // How many of the steps fall before `timer_ticks` after the start of the tick.
 inline uint16_t steps_before(const StepSchedule &schedule, uint16_t timer_ticks) {
   if (schedule.count == 0 || schedule.first >= timer_ticks) return 0;
-  const uint16_t passed = static_cast<uint16_t>(
-      1 + (timer_ticks - 1 - schedule.first) / (schedule.interval != 0 ? schedule.interval : 1));
+  const uint16_t passed =
+      static_cast<uint16_t>(1 + (timer_ticks - 1 - schedule.first) / schedule.interval);
   return passed < schedule.count ? passed : schedule.count;
 }
 

@@ -25,7 +25,6 @@ class Tare {
     }
   }
 
-  void abandon() { left_ = 0; }
   bool done() const { return done_; }
   int32_t zero() const { return zero_; }
 

@@ -1,0 +1,12 @@
+// Counters that stay at their highest value rather than start over.
+#pragma once
+
+#include <stdint.h>
+
+namespace rig {
+
+inline void count(uint16_t &counter) {
+  if (counter != 0xFFFF) ++counter;
+}
+
+}  // namespace rig
