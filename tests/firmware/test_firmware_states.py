@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from board_under_test import Board
+from board_under_test import STATES, Board
+from rig.board._firmware import lib
 
 
 def test_a_new_board_boots_to_idle_with_the_valve_open_and_the_motor_off() -> None:
@@ -92,6 +93,7 @@ def test_another_transducer_needs_another_zero_and_the_same_does_not(name: str) 
 def test_run_closes_the_valve_and_regulates() -> None:
     board = Board().at(3.0)
     assert board.state == "run"
+    assert STATES[lib.rig_host_state(board.host)] == "run"
     assert not board.bench.valve_open
     assert board.bench.pressure_kpa == pytest.approx(3.0, abs=0.03)
     assert board.last("PRESSURE")["setpoint_kpa"] == pytest.approx(3.0)
