@@ -178,7 +178,7 @@ def test_a_simulated_millisecond_costs_less_than_its_budget() -> None:
     count = 200_000
     best_s = float("inf")
     for _ in range(5):
-        start = time.perf_counter()
+        start = time.process_time()
         lib.rig_host_run(host, lib.rig_test_bench_idle, ffi.NULL, count, 0)
-        best_s = min(best_s, time.perf_counter() - start)
+        best_s = min(best_s, time.process_time() - start)
     assert best_s / count * 1e6 < MICROSECONDS_PER_MILLISECOND
