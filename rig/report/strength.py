@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rig.mechanics.fe import Extremes
+from rig.mechanics.fe import Extremes, Kinematics, summarise
 from rig.mechanics.job import Job
 from rig.mechanics.simulate.prediction import free_inflation
 from rig.mechanics.strength import Criterion, safety
@@ -33,7 +33,8 @@ class StrengthRow:
 class StrengthSection:
     """Stress and strain of an actuator as calculated."""
 
-    view: View
+    view: View | None
+    """None of models in the plane, which have no surface to turn."""
     rows: tuple[StrengthRow, ...]
     material: str
     sources: tuple[str, ...]
@@ -53,11 +54,16 @@ def strength_section(
     Raises MechanicsError where the family has no such model or it reached no pressure.
     """
     found, solutions = free_inflation(actuator, material).solutions(top, job)
-    scene = scene_of(found.model, solutions, found.mirror)
+    view: View | None = None
+    if found.model.discretisation.kinematics is Kinematics.SOLID:
+        scene = scene_of(found.model, solutions, found.mirror)
+        view, extremes = view_of(scene), scene.extremes
+    else:
+        extremes = tuple(summarise(found.model, s) for s in solutions)
     ranges = [material.tensile_strength, material.elongation_at_break]
     return StrengthSection(
-        view=view_of(scene),
-        rows=tuple(_row(extremes, material) for extremes in scene.extremes),
+        view=view,
+        rows=tuple(_row(at_pressure, material) for at_pressure in extremes),
         material=material.name,
         sources=tuple(dict.fromkeys(r.source for r in ranges if r is not None)),
     )

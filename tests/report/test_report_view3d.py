@@ -14,8 +14,21 @@ import numpy as np
 import pytest
 from html_page import Page
 
-from rig.mechanics.fe import Model, Point, Solution, follow, nodal_fields, summarise
+from rig.mechanics.fe import (
+    Kinematics,
+    Model,
+    Point,
+    PressureSurface,
+    Solid,
+    Solution,
+    Support,
+    discretise,
+    follow,
+    nodal_fields,
+    summarise,
+)
 from rig.mechanics.fe.surface import surface_of
+from rig.mechanics.hyperelastic import NeoHookean, QuadraticVolume
 from rig.mechanics.job import Job
 from rig.mechanics.simulate.families import MODELS
 from rig.record.reader import RunReader
@@ -28,7 +41,7 @@ from rig.spec.actuator import ActuatorSpec
 from rig.spec.loading import load_actuator
 from rig.spec.material import MaterialSpec
 from rig.spec.workspace import Workspace
-from tests.mechanics.fe_problems import bending_tube
+from tests.mechanics.fe_problems import BULK, SHEAR, bending_tube, ring
 from tests.mechanics.test_simulate_free import BendingTube
 
 LIBRARY = Path(__file__).resolve().parents[2] / "models"
@@ -181,6 +194,25 @@ def test_a_material_without_strength_gets_no_factors(
     found = strength_section(actuator, bare, 1e3, Job())
     assert found.criteria == ()
     assert "there are no safety factors" in render_strength(found, "tube")
+
+
+def test_a_model_in_the_plane_has_factors_but_nothing_to_turn(
+    specs: tuple[ActuatorSpec, MaterialSpec], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    d = discretise(ring(1, 2, 0.01, 0.02), Kinematics.AXISYMMETRIC)
+    solid = Solid(d, NeoHookean(SHEAR), QuadraticVolume(BULK))
+    base = Support.of(d, d.nodes_at(z=0.0), (0, 1))
+    bore = PressureSurface(d, d.facets_on("bore"))
+    actuator = BendingTube()
+    actuator.model = Model(d, [solid], supports=[base], surface=bore)
+    actuator.angle = actuator.displacement = lambda state: 0.0
+    monkeypatch.setitem(MODELS, "bellow-bending", lambda geometry, material: actuator)
+    found = strength_section(*specs, 1e3, Job())
+    assert found.view is None
+    assert found.rows[-1].von_mises_kpa > 0.5
+    page = Page(render_strength(found, "dome"))
+    assert not list(page.all("canvas"))
+    assert len(list(page.all("table"))) == 1
 
 
 def test_the_report_embeds_the_view(run_folder: Path, section: StrengthSection) -> None:
