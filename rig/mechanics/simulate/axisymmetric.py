@@ -64,7 +64,7 @@ def axisymmetric_model(
 ) -> AxisymmetricModel:
     """Mesh the meridian and put its model together.
 
-    The default resolution is `level(1)`: half a per cent from the limit of refinement with half
+    The default resolution is `level(1)`: about 0.6 % from the limit of refinement with half
     circles at 50 kPa, less with flatter arcs. `follower` false keeps the pressure's forces as
     they are on the undeformed surface. Raises MechanicsError for a material without a volumetric
     energy.
