@@ -27,7 +27,7 @@ _COARSE, _FINE = 4, 17
 _NARROWER = 4
 """Times the reach is halved for the first look."""
 _FACING = np.cos(np.pi / 6)
-_CANDIDATES = 4
+_CANDIDATES = 8
 """Pairs of facets that are sampled again."""
 
 
@@ -66,8 +66,9 @@ class FacingSurface:
         """The closest facing points for the displacements in x; None if all are out of reach."""
         places, normals, number = self._samples.at(x)
         tree = cKDTree(places)
-        # most pairs are far apart: look near first
-        for reach in self._reach / 2.0 ** np.arange(_NARROWER, -1, -1):
+        # most pairs are far apart: look near first, but as far as parts may have passed through
+        nearer = self._reach / 2.0 ** np.arange(_NARROWER, 0, -1)
+        for reach in (*nearer[nearer >= self._depth], self._reach):
             pairs = tree.query_pairs(reach, output_type="ndarray")
             distance, faces = self._facing(places, normals, pairs)
             pairs, distance = pairs[faces], distance[faces]
