@@ -36,7 +36,7 @@ def main(folder: str) -> None:
         "_emulator",
         '#include "emulator.h"',
         source_extension=".cpp",
-        sources=[str(HERE / "emulator.cpp")],
+        sources=[str(source) for source in sorted(HERE.glob("*.cpp"))],
         include_dirs=[str(HERE), str(HOST)],
         libraries=["simavr"],
         extra_compile_args=["-std=c++14", "-O2", "-Wall", "-Wextra"],

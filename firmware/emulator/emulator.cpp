@@ -25,11 +25,13 @@ extern "C" {
 }
 
 #include "hx711_chip.h"
+#include "processor.h"
 #include "stepper_driver.h"
 
 namespace {
 
 using rig_emulator_parts::Hx711Chip;
+using rig_emulator_parts::Processor;
 using rig_emulator_parts::StepperDriver;
 
 constexpr uint32_t kFrequency = 16000000;
@@ -82,6 +84,7 @@ void take_complaint(avr_t *, const int level, const char *format, va_list argume
 
 struct rig_emulator {
   avr_t *avr = nullptr;
+  std::unique_ptr<Processor> processor;
   avr_io_t module = {};  // how libsimavr tells of resets and of the watchdog instruction
   avr_irq_t *port_a = nullptr, *port_c = nullptr, *adc = nullptr, *uart = nullptr;
   avr_flashaddr_t hang_address = 0;
@@ -111,7 +114,6 @@ struct rig_emulator {
     uint64_t began, interrupt_cycles;
   };
   std::deque<Tick> ticks;  // begun, and not yet done
-  bool tick_done = false;  // but for what is left until the sleep
   uint64_t step_due = 0;
   size_t step_log_capacity = 0;
   std::vector<uint64_t> steps_due, steps_rose;
@@ -145,6 +147,8 @@ struct rig_emulator {
   void wire() {
     avr->frequency = kFrequency;
     avr->vcc = avr->avcc = avr->aref = kSupplyMillivolts;
+    processor.reset(new Processor(avr));
+    avr->run = [](avr_t *a) { owner(a)->processor->run(); };
     avr->sleep = [](avr_t *a, avr_cycle_count_t cycles) { owner(a)->sleeps(cycles); };
     avr->custom.data = this;
     uint32_t no_flags = 0;  // neither an echo on our own terminal nor a rest in wall time
@@ -212,7 +216,6 @@ struct rig_emulator {
     set_outputs(0, 0);
     drive_inputs(true);
     ticks.clear();
-    tick_done = false;
     interrupt_began = 0;
   }
 
@@ -245,7 +248,8 @@ struct rig_emulator {
   }
 
   void step_bench() {
-    const rig_pins_out out = {stepper.take_steps(), stepper.enabled(), (levels & kValve) != 0};
+    const rig_pins_out out = {stepper.take_steps(), stepper.enabled(), (levels & kValve) != 0,
+                              hx711.awake()};
     pins = {};
     bench_fn(bench, &out, &pins);
     ++time_ms;
@@ -355,20 +359,13 @@ struct rig_emulator {
   // --- measuring ---------------------------------------------------------------------------------
 
   void sleeps(avr_cycle_count_t cycles) {
-    note_tick();
     avr->cycle -= 1;  // libsimavr adds one to every sleep
     load.slept += cycles;
   }
 
-  // The firmware feeds the watchdog once a tick, when the tick is decided.
+  // The firmware feeds the watchdog when a tick is decided and its pins are written.
   void watchdog_fed() {
-    note_tick();  // unless it has slept since, as it does not with an interrupt waiting
-    tick_done = !ticks.empty();
-  }
-
-  void note_tick() {
-    if (!tick_done) return;
-    tick_done = false;
+    if (ticks.empty()) return;  // switching the watchdog on feeds it, too
     const Tick tick = ticks.front();
     ticks.pop_front();
     const uint64_t response = avr->cycle - tick.began;
@@ -490,6 +487,10 @@ void rig_emulator_restart(rig_emulator *emulator, uint8_t cause, uint32_t dead_m
     emulator->dead_ms = dead_ms;
     emulator->restart_cause = cause;
   }
+}
+
+void rig_emulator_run_plainly(rig_emulator *emulator) {
+  emulator->avr->run = avr_callback_run_raw;
 }
 
 void rig_emulator_hang(rig_emulator *emulator) {

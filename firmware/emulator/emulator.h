@@ -43,6 +43,9 @@ uint32_t rig_emulator_program_counter(const rig_emulator *emulator);
  * reset_cause of rig.dbc. Meanwhile its outputs are not driven. The EEPROM is kept. */
 void rig_emulator_restart(rig_emulator *emulator, uint8_t cause, uint32_t dead_ms);
 
+/* From now on libsimavr runs every instruction itself: slower, for comparison. */
+void rig_emulator_run_plainly(rig_emulator *emulator);
+
 /* The main loop hangs, interrupts go on; only the watchdog helps. */
 void rig_emulator_hang(rig_emulator *emulator);
 
@@ -84,8 +87,8 @@ typedef struct {
 typedef struct {
   uint64_t cycles, slept;
   uint64_t ticks;
-  /* of a control tick, from its interrupt to the main loop's next sleep: all cycles, and those
-   * outside interrupts */
+  /* of a control tick, from its interrupt until it is decided and its pins are written, which must
+   * be before the next: all cycles, and those outside interrupts */
   uint64_t response_cycles, own_cycles;
   uint32_t most_response, most_own;
   rig_interrupt_figures interrupts[RIG_VECTORS]; /* by vector number */

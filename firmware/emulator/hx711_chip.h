@@ -51,6 +51,7 @@ class Hx711Chip {
     ++figures_.power_downs;
   }
 
+  bool awake() const { return !asleep_; }
   bool data_line() const { return data_; }
   const rig_hx711_figures &figures() const { return figures_; }
 

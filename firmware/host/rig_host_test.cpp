@@ -156,7 +156,7 @@ void rig_test_plunger_move_to(rig_test_plunger *plunger, float target_ml, float 
   plunger->motion.move_to(rig::ml(target_ml), rig::ml_s(speed_ml_s));
 }
 
-int32_t rig_test_plunger_tick(rig_test_plunger *plunger, uint16_t *first, uint16_t *interval) {
+int32_t rig_test_plunger_tick(rig_test_plunger *plunger, uint16_t *first, uint32_t *interval) {
   const rig::StepSchedule steps = plunger->motion.tick();
   *first = steps.first;
   *interval = steps.interval;

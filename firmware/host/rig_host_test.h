@@ -57,8 +57,9 @@ rig_test_plunger *rig_test_plunger_new(float max_flow_ml_s, float acceleration_m
 void rig_test_plunger_free(rig_test_plunger *plunger);
 void rig_test_plunger_set_velocity(rig_test_plunger *plunger, float flow_ml_s);
 void rig_test_plunger_move_to(rig_test_plunger *plunger, float target_ml, float speed_ml_s);
-/* One tick of 2 ms; returns the signed steps, and where they fall (timer ticks of 0.5 us). */
-int32_t rig_test_plunger_tick(rig_test_plunger *plunger, uint16_t *first, uint16_t *interval);
+/* One tick of 2 ms; returns the signed steps, and where they fall: the first in timer ticks of
+ * 0.5 us, the interval in 1/256 of them. */
+int32_t rig_test_plunger_tick(rig_test_plunger *plunger, uint16_t *first, uint32_t *interval);
 float rig_test_plunger_position_ml(const rig_test_plunger *plunger);
 float rig_test_plunger_velocity_ml_s(const rig_test_plunger *plunger);
 int rig_test_plunger_arrived(const rig_test_plunger *plunger);

@@ -76,8 +76,8 @@ class InterruptFigures:
 class LoadFigures:
     """The processor's load; cycles of 62.5 ns.
 
-    A tick's response runs from its interrupt until the main loop sleeps again, its own cycles are
-    those outside interrupts.
+    A tick's response runs from its interrupt until it is decided and its pins are written; its own
+    cycles are those outside interrupts.
     """
 
     cycles: int
@@ -190,6 +190,10 @@ class EmulatedBoard(SimulatedBoard):
         """Hold the HX711's data line low (always ready) or high (never); None sets it free."""
         held = {None: "RIG_LINE_FREE", False: "RIG_LINE_LOW", True: "RIG_LINE_HIGH"}[level]
         self._lib.rig_emulator_hold_hx711(self._board, getattr(self._lib, held))
+
+    def run_plainly(self) -> None:
+        """Let libsimavr run every instruction from now on: the same, slower."""
+        self._lib.rig_emulator_run_plainly(self._board)
 
     # --- what the emulator saw --------------------------------------------------
 

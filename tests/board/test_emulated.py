@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 
 import can
+import numpy as np
 import pytest
 
 from rig.board import emulator_build
@@ -120,6 +121,43 @@ def test_two_runs_of_the_image_are_the_same_to_the_bit(setup: Setup) -> None:
     first = bytes_of_a_run()
     assert len(first) > 1000
     assert first == bytes_of_a_run()
+
+
+@needs_packages
+def test_instructions_do_what_they_do_in_libsimavr_to_the_cycle(setup: Setup) -> None:
+    def seen(plainly: bool) -> tuple[object, ...]:
+        rig = Emulated(setup, 2)
+        if plainly:
+            rig.board.run_plainly()
+        rig.link.command("home")
+        rig.board.log_steps(100_000)
+        messages = rig.link.wait(2.0)
+        steps = rig.board.logged_steps()
+        figures = (rig.board.load_figures(), rig.board.stepper_figures())
+        return messages, steps.due.tobytes(), steps.rose.tobytes(), figures
+
+    fast = seen(plainly=False)
+    assert len(fast[1]) > 8 * 5000  # bytes: it stepped
+    assert fast == seen(plainly=True)
+
+
+@needs_packages
+def test_step_pulses_are_evenly_spaced_at_10_khz_and_no_tick_is_late(setup: Setup) -> None:
+    rig = Emulated(setup)
+    rig.home_and_zero()
+    flow_ml_s = setup.bench.volume_per_step * 1e6 * 10e3
+    rig.link.command("jog", flow_ml_s)
+    rig.link.wait(0.2)  # up to speed
+    rig.board.log_steps(100_000)
+    rig.board.restart_load_figures()
+    rig.link.wait(0.2)
+    intervals = np.diff(rig.board.logged_steps().rose)
+    assert len(intervals) > 1900
+    assert intervals.mean() == pytest.approx(100e-6, rel=2e-3)
+    assert np.abs(intervals - np.median(intervals)).max() < 10e-6
+    load = rig.board.load_figures()
+    assert load.most_response < 32_000  # 2 ms
+    assert 0.3 < load.busy < 0.6
 
 
 @needs_packages

@@ -74,9 +74,17 @@ void exchange_bytes() {
   while (!queue.empty() && serial_can_write()) serial_write(queue.pop());
 }
 
-void sleep_until_interrupt() {
+// Conversions and bytes wake the processor twenty times a tick, for nothing that cannot wait. No
+// tick slips in between the question and the sleep: what follows sei is still carried out.
+void sleep_until_tick() {
   SMCR = _BV(SE);  // idle
-  sleep_cpu();
+  cli();
+  while (!tick_waiting()) {
+    sei();
+    sleep_cpu();
+    cli();
+  }
+  sei();
   SMCR = 0;
 }
 
@@ -94,20 +102,24 @@ void begin() {
   watchdog_begin();
 }
 
+// The tick first: the next one carries out what this one decides.
 void step() {
-  exchange_bytes();
   TickSample sample;
   if (tick_due(sample)) {
+    const uint16_t queued = core().transmit_queue().size();
     core().tick(read_pins(sample));
+    // a message and a conversion in one tick would make it late; the chip waits
+    const bool reported = core().transmit_queue().size() != queued;
     write_pins(core().outputs());
     wdt_reset();
-    if (core().outputs().load_cell_powered && hx711_ready()) {
+    if (!reported && core().outputs().load_cell_powered && hx711_ready()) {
       core().load_cell_word(hx711_read());
     }
     if (!store.writing() && core().take_save(store.image())) store.begin_write();
     store.step();
   }
-  sleep_until_interrupt();
+  exchange_bytes();
+  sleep_until_tick();
 }
 
 }  // namespace mega

@@ -6,7 +6,7 @@ namespace mega {
 
 void begin();
 
-// One turn of the main loop; returns after the next interrupt.
+// One turn of the main loop; returns when the next tick is due.
 void step();
 
 }  // namespace mega

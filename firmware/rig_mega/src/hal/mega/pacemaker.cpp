@@ -17,6 +17,7 @@ constexpr int16_t kSoonest = 8;
 
 StepSchedule planned = kNoSteps;
 StepSchedule running = kNoSteps;  // `count` is what is left
+uint8_t step_fraction;           // of a timer tick, by which the next step is due later
 volatile uint8_t ticks_waiting;
 TickSample sample_waiting;
 
@@ -30,7 +31,8 @@ StepSchedule merged(const StepSchedule &a, const StepSchedule &b) {
   if (sum == 0) return kNoSteps;
   const uint16_t count = static_cast<uint16_t>(sum > 0 ? sum : -sum);
   const uint16_t interval = kTimerTicksPerTick / count;
-  return {sum > 0, count, static_cast<uint16_t>(interval / 2), interval};
+  return {sum > 0, count, static_cast<uint16_t>(interval / 2),
+          static_cast<uint32_t>(interval) * kIntervalScale};
 }
 
 void step_at(uint16_t when) {
@@ -48,6 +50,8 @@ void pacemaker_begin() {
   TIFR1 = _BV(OCF1A) | _BV(OCF1B);
   TIMSK1 = _BV(OCIE1B);
 }
+
+bool tick_waiting() { return ticks_waiting != 0; }
 
 bool tick_due(TickSample &sample) {
   bool due = false;
@@ -79,6 +83,7 @@ ISR(TIMER1_COMPB_vect) {
     } else {
       PORTA &= static_cast<uint8_t>(~kDirection);
     }
+    step_fraction = 0;
     step_at(static_cast<uint16_t>(start + running.first));
     TIFR1 = _BV(OCF1A);
     TIMSK1 |= _BV(OCIE1A);
@@ -94,7 +99,10 @@ ISR(TIMER1_COMPA_vect) {
   if (left == 0) {
     TIMSK1 &= static_cast<uint8_t>(~_BV(OCIE1A));
   } else {
-    step_at(static_cast<uint16_t>(OCR1A + running.interval));
+    const uint8_t before = step_fraction;
+    step_fraction = static_cast<uint8_t>(before + (running.interval & 0xFF));
+    const uint16_t interval = static_cast<uint16_t>(running.interval >> 8);
+    step_at(static_cast<uint16_t>(OCR1A + interval + (step_fraction < before ? 1 : 0)));
   }
   __builtin_avr_delay_cycles(16);  // drivers want the pulse 2 us long
   PORTA &= static_cast<uint8_t>(~kStep);

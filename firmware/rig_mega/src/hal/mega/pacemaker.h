@@ -16,6 +16,8 @@ struct TickSample {
 
 void pacemaker_begin();
 
+bool tick_waiting();
+
 // True once for each tick, with the conversions made during it.
 bool tick_due(TickSample &sample);
 
