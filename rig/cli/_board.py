@@ -14,7 +14,7 @@ from rig.spec.bench import SerialBoard
 from rig.spec.workspace import Workspace
 
 ACTUATOR = "bellow-bending"
-"""What hangs on a virtual bench while nobody looks at it."""
+"""What hangs on a simulated bench while nobody looks at it."""
 
 
 def serial_port(bench: str, port: str | None) -> str:
@@ -25,6 +25,11 @@ def serial_port(bench: str, port: str | None) -> str:
     if not isinstance(board, SerialBoard):
         raise LinkError(f"the bench '{bench}' has no serial port; give one with --port.")
     return board.port
+
+
+def is_simulated(bench: str, port: str | None) -> bool:
+    """Whether the board starts anew, with nothing kept, every time it is opened."""
+    return port is None and not isinstance(Workspace.find().bench(bench).board, SerialBoard)
 
 
 @contextmanager

@@ -316,7 +316,7 @@ def _rule(name: str) -> ParameterRule:
 def _write(wanted: dict[str, float], bench: str, port: str | None, keep: bool) -> None:
     """Write parameters, print what changed, and have them kept."""
     from rig.board.parameter_file import format_value
-    from rig.cli._board import talking
+    from rig.cli._board import is_simulated, talking
 
     rules = _rules()
     with talking(bench, port) as link:
@@ -329,8 +329,8 @@ def _write(wanted: dict[str, float], bench: str, port: str | None, keep: bool) -
         if keep:
             link.save_parameters()
         kept = "and kept" if keep else "but not kept"
-        if link.identity is not None and link.identity.board == "host":
-            kept = "until this command ends"  # a virtual board is new every time
+        if is_simulated(bench, port):
+            kept = "until this command ends"
         typer.echo(f"{len(wanted)} parameters are in force at {link.name}, {kept}.")
 
 
