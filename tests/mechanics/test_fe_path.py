@@ -248,6 +248,7 @@ def test_a_path_continues_from_any_state(tube, inflated) -> None:
 
 
 def test_the_record_adds_up(inflated) -> None:
+    assert inflated.solver in ("multifrontal", "PARDISO")
     assert inflated.solves == sum(len(s.iterations) - 1 for s in inflated.history)
     assert 0 < inflated.assembly_seconds + inflated.solve_seconds <= inflated.seconds
 

@@ -278,6 +278,7 @@ def settle(
                 history=reached.history + part.history,
                 failure=part.failure,
                 seconds=reached.seconds + part.seconds,
+                solver=part.solver,
             )
             if part.failure is not None:
                 return reached

@@ -110,12 +110,17 @@ def solve_step(
     solver: LinearSolver,
     options: Options,
     clock: Clock = time.perf_counter,
+    assembly: Assembly | None = None,
 ) -> Outcome:
-    """Newton from `start` to equilibrium at `target`; never raises for lack of convergence."""
+    """Newton from `start` to equilibrium at `target`; never raises for lack of convergence.
+
+    `assembly` is that of `start`, tangent included, where it is known already.
+    """
     timer = _Timer(clock)
     state = start
     record: list[Iteration] = []
-    assembly = timer.assemble(model, state)
+    if assembly is None or assembly.data is None:
+        assembly = timer.assemble(model, state)
     reason = ""
     while True:
         residual = _relative_residual(model, state, assembly, target)

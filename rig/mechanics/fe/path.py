@@ -17,7 +17,7 @@ from threadpoolctl import ThreadpoolController
 
 from rig.mechanics.fe.control import Control, PressureControl, Situation
 from rig.mechanics.fe.linear import LinearSolver, default_solver
-from rig.mechanics.fe.model import Model
+from rig.mechanics.fe.model import Assembly, Model
 from rig.mechanics.fe.newton import Clock, Iteration, Options, Outcome, Target, solve_step
 from rig.mechanics.fe.rotation import rotation_matrix, rotation_vector
 from rig.mechanics.fe.state import PointState, Pose, State
@@ -103,6 +103,8 @@ class Result:
     seconds: float
     cancelled: bool = False
     """Whether the watcher ended it."""
+    solver: str = ""
+    """Name of the linear solver: PARDISO only where it is installed."""
 
     @property
     def solves(self) -> int:
@@ -156,7 +158,14 @@ def follow(
                 break
             state = arrived.state
             solutions.append(Solution(state, arrived.assembly.volume, arrived.assembly.residual))
-    return Result(tuple(solutions), tuple(run.history), failure, clock() - begin, run.cancelled)
+    return Result(
+        solutions=tuple(solutions),
+        history=tuple(run.history),
+        failure=failure,
+        seconds=clock() - begin,
+        cancelled=run.cancelled,
+        solver=run.solver.name,
+    )
 
 
 @functools.cache
@@ -182,6 +191,8 @@ class _Run:
         self.clock = clock
         self.history: list[StepRecord] = []
         self.cancelled = False
+        self._here: State | None = None
+        self._latest: Outcome | None = None
         self._past: list[tuple[float, State]] = []
         self._kind = ""
         self._step = 1.0
@@ -190,16 +201,17 @@ class _Run:
         self, state: State, point: Point, index: int, told: Callable[[StepRecord], bool]
     ) -> Outcome | str:
         """Steps from `state` to `point`; what went wrong, in words, if it cannot be reached."""
-        rest = self.model.assemble(state, tangent=False)
-        first = Target(
-            self.control.value(Situation(self.model, state, rest)), state.dead, state.motion
-        )
+        situation = Situation(self.model, state, self._assembly_at(state))
+        first = Target(self.control.value(situation), state.dead, state.motion)
         parameter = self._parameter(first, point)
         done, mixed, cuts = 0.0, self.options.mixed_points, 0
+        self._here = self._clean(state)
         if not self._past:
-            self._past = [(parameter(0.0), self._clean(state))]
+            self._remember(parameter(0.0), self._here)
         while True:
-            fraction, target, begin = self._prepare(first, point, parameter, done, mixed)
+            started = self.clock()
+            fraction, target, begin, assembly = self._prepare(first, point, parameter, done, mixed)
+            preparing = self.clock() - started
             outcome = solve_step(
                 self.model,
                 begin,
@@ -208,6 +220,7 @@ class _Run:
                 self.solver,
                 replace(self.options, mixed_points=mixed),
                 self.clock,
+                assembly,
             )
             record = StepRecord(
                 point=index,
@@ -216,7 +229,7 @@ class _Run:
                 converged=outcome.converged,
                 mixed_points=mixed,
                 iterations=outcome.iterations,
-                assembly_seconds=outcome.assembly_seconds,
+                assembly_seconds=preparing + outcome.assembly_seconds,
                 solve_seconds=outcome.solve_seconds,
                 reason=outcome.reason,
             )
@@ -225,10 +238,11 @@ class _Run:
                 self.cancelled = True
                 return self._words(outcome, point, fraction, "it was cancelled")
             if outcome.converged:
-                clean = self._clean(outcome.state)
-                self._past = [*self._past[-_KNOTS + 1 :], (parameter(fraction), clean)]
+                self._here = self._clean(outcome.state)
+                self._remember(parameter(fraction), self._here)
+                self._latest = replace(outcome, state=self._here)
                 if fraction == 1.0:
-                    return replace(outcome, state=clean)
+                    return self._latest
                 if record.solves <= _EASY:
                     self._step = min(1.0, 2 * self._step)
                 done, mixed, cuts = fraction, self.options.mixed_points, 0
@@ -241,6 +255,16 @@ class _Run:
             if self._step < self.options.least_step:
                 return self._words(outcome, point, fraction, outcome.reason)
 
+    def _assembly_at(self, state: State) -> Assembly:
+        latest = self._latest
+        if latest is not None and latest.state is state:
+            return latest.assembly
+        return self.model.assemble(state, tangent=False)
+
+    def _remember(self, parameter: float, state: State) -> None:
+        full = self._with_points(state) if self.options.mixed_points else state
+        self._past = [*self._past[1 - _KNOTS :], (parameter, full)]
+
     def _prepare(
         self,
         first: Target,
@@ -248,74 +272,54 @@ class _Run:
         parameter: Callable[[float], float],
         done: float,
         mixed: bool,
-    ) -> tuple[float, Target, State]:
-        """How far to go, what must hold there and where to start from."""
+    ) -> tuple[float, Target, State, Assembly | None]:
+        """How far to go, what must hold there, where to start from, and the assembly there if it
+        was needed to find out."""
         while True:
             fraction = min(1.0, done + self._step)
             if 1.0 - fraction < 1e-9:
                 fraction = 1.0
-            target = Target(
-                first.control + fraction * (point.control - first.control),
-                first.dead + fraction * (point.dead - first.dead),
-                first.motion + fraction * (point.motion - first.motion),
-            )
-            begin, gap = self._predicted(target, parameter(fraction), mixed)
+            target = _between(first, point, fraction)
+            begin, assembly = self._predicted(target, parameter(fraction), mixed)
+            gap = assembly.gap if assembly is not None else 0.0
             if gap <= _FAR or self._step < 4 * self.options.least_step:
-                return fraction, target, begin
+                return fraction, target, begin, assembly
             # the error of the prediction grows with the square of the step or faster
             self._step = (fraction - done) * max(0.25, 0.8 * (_FAR / gap) ** 0.5)
 
-    def _predicted(self, target: Target, parameter: float, mixed: bool) -> tuple[State, float]:
-        """Where to start from, and by how much its independent strains miss the others."""
-        last = self._past[-1][1]
+    def _predicted(
+        self, target: Target, parameter: float, mixed: bool
+    ) -> tuple[State, Assembly | None]:
+        """Where to start from, and the assembly there if it was needed to find out."""
+        last = self._here
+        assert last is not None
         current = self._with_points(last) if mixed else last
         if not self.options.extrapolate or len(self._past) < 2:
-            return current, 0.0
+            return current, None
         knots = np.array([p for p, _ in self._past])
         if np.any(np.diff(knots) == 0) or (parameter - knots[-1]) * (knots[-1] - knots[-2]) <= 0:
-            return current, 0.0
+            return current, None
         weights = _lagrange(knots, parameter)
-        states = [s for _, s in self._past]
-        x = np.sum([w * s.x for w, s in zip(weights, states, strict=True)], axis=0)
+        states = [s if mixed else self._clean(s) for _, s in self._past]
+        x = _blend(weights, [s.x for s in states])
         x[self.model.held] = self.model.prescribed(target.motion)
         pressure = float(np.dot(weights, [s.pressure for s in states]))
         if isinstance(self.control, PressureControl):
             pressure = target.control
         poses = tuple(
-            _extrapolated_pose([s.poses[i] for s in states], weights)
+            _extrapolated_pose([s.poses[i] for s in states], last.poses[i], weights)
             for i in range(len(last.poses))
         )
         points = tuple(
-            PointState(
-                np.asarray(
-                    np.sum(
-                        [w * s.points[i].pressure for w, s in zip(weights, states, strict=True)],
-                        axis=0,
-                    )
-                )
-            )
+            _extrapolated_points([s.points[i] for s in states], weights)
             for i in range(len(last.points))
         )
         guess = State(x, points, poses, pressure, target.dead, target.motion)
         guess = self.model.with_bodies_in_place(guess)
-        found = self.model.assemble(guess, tangent=False)
+        found = self.model.assemble(guess)
         if not np.all(np.isfinite(found.residual)) or found.least_volume_ratio <= 0:
-            return current, 0.0
-        if not mixed:
-            return guess, 0.0
-        own = [self._with_points(s) for s in states]
-        guess = replace(
-            guess,
-            points=tuple(
-                PointState(
-                    guess.points[i].pressure,
-                    _blend(weights, [s.points[i].strain for s in own]),
-                    _blend(weights, [s.points[i].stress for s in own]),
-                )
-                for i in range(len(points))
-            ),
-        )
-        return guess, self.model.assemble(guess, tangent=False).gap
+            return current, None
+        return guess, found
 
     def _with_points(self, state: State) -> State:
         return replace(
@@ -347,7 +351,7 @@ class _Run:
 
     def _words(self, outcome: Outcome, point: Point, fraction: float, why: str) -> str:
         d = self.model.discretisation
-        last = self._past[-1][1]
+        last = self._here or self.model.start()
         where = ", ".join(f"{1e3 * c:.4g}" for c in d.nodes[outcome.worst_node])
         residual = outcome.iterations[-1].residual
         return (
@@ -378,22 +382,31 @@ def _lagrange(knots: Array, at: float) -> Array:
     )
 
 
-def _blend(weights: Array, tensors: list[Array | None]) -> Array:
-    total = np.zeros_like(tensors[0])
-    for w, t in zip(weights, tensors, strict=True):
-        assert t is not None
-        total += w * t
+def _between(first: Target, point: Point, fraction: float) -> Target:
+    return Target(
+        first.control + fraction * (point.control - first.control),
+        first.dead + fraction * (point.dead - first.dead),
+        first.motion + fraction * (point.motion - first.motion),
+    )
+
+
+def _blend(weights: Array, parts: list[Array]) -> Array:
+    total = np.zeros_like(parts[0])
+    for w, part in zip(weights, parts, strict=True):
+        total += w * part
     return total
 
 
-def _extrapolated_pose(poses: list[Pose], weights: Array) -> Pose:
-    last = poses[-1]
-    shift = np.sum([w * p.shift for w, p in zip(weights, poses, strict=True)], axis=0)
-    spin = np.sum(
-        [
-            w * rotation_vector(p.rotation @ last.rotation.T)
-            for w, p in zip(weights, poses, strict=True)
-        ],
-        axis=0,
-    )
-    return Pose(np.asarray(shift), rotation_matrix(np.asarray(spin)) @ last.rotation)
+def _extrapolated_points(points: list[PointState], weights: Array) -> PointState:
+    pressure = _blend(weights, [p.pressure for p in points])
+    strains = [p.strain for p in points if p.strain is not None]
+    stresses = [p.stress for p in points if p.stress is not None]
+    if not strains:
+        return PointState(pressure)
+    return PointState(pressure, _blend(weights, strains), _blend(weights, stresses))
+
+
+def _extrapolated_pose(poses: list[Pose], last: Pose, weights: Array) -> Pose:
+    shift = _blend(weights, [p.shift for p in poses])
+    spin = _blend(weights, [rotation_vector(p.rotation @ last.rotation.T) for p in poses])
+    return Pose(shift, rotation_matrix(spin) @ last.rotation)

@@ -185,7 +185,11 @@ class _Side:
     def of(element: Any, cell: Any, number: int) -> _Side:
         corners = cell.p[:, list(cell.facets[number])].T
         along = _along(corners)
-        normal = np.cross(*along) if len(along) == 2 else np.array([along[0][1], -along[0][0]])
+        normal = (
+            np.cross(along[0], along[1])
+            if len(along) == 2
+            else np.array([along[0][1], -along[0][0]])
+        )
         if normal @ (corners.mean(axis=0) - cell.p.mean(axis=1)) < 0:
             corners = corners[::-1]
             along = _along(corners)
