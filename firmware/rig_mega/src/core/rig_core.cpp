@@ -324,12 +324,7 @@ void RigCore::handle(const ParameterRequest &request) {
     case ParameterOperation::kRead:
       if (known) result = ParameterResult::kAccepted;
       break;
-    case ParameterOperation::kWrite: {
-      const bool at_rest = !safety_.needs_host() && !motion_.moving();
-      result = parameters_.set(request.index, request.value, at_rest);
-      if (result == ParameterResult::kAccepted) configure();
-      break;
-    }
+    case ParameterOperation::kWrite: result = write(request); break;
     case ParameterOperation::kSave:
       save_asked_ = true;
       result = ParameterResult::kAccepted;
@@ -337,6 +332,13 @@ void RigCore::handle(const ParameterRequest &request) {
   }
   const float value = known ? parameters_.get(request.index) : 0.0f;
   link_.send(pack(ParameterReport{result, request.number, request.index, value}));
+}
+
+ParameterResult RigCore::write(const ParameterRequest &request) {
+  const bool at_rest = !safety_.needs_host() && !motion_.moving();
+  const ParameterResult result = parameters_.set(request.index, request.value, at_rest);
+  if (result == ParameterResult::kAccepted) configure();
+  return result;
 }
 
 bool RigCore::take_save(uint8_t *image) {

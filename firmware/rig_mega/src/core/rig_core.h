@@ -90,6 +90,7 @@ class RigCore {
   void handle(const CanFrame &frame);
   void handle(const Command &command);
   void handle(const ParameterRequest &request);
+  ParameterResult write(const ParameterRequest &request);
   CommandResult execute(const Command &command);
   void vent();
   CommandResult set_pressure(float target_kpa);
