@@ -20,6 +20,8 @@ LIBRARY = (
     "firmware/rig.dbc",
     "firmware/Makefile",
     "firmware/rig_mega/**/*",
+    "firmware/emulator/*",
+    "firmware/host/rig_host.h",
 )
 
 

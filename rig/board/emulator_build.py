@@ -19,6 +19,7 @@ from pathlib import Path
 from types import ModuleType
 
 from rig.board.errors import BoardError
+from rig.board.image import build_image
 from rig.board.revision import firmware_revision
 from rig.spec.workspace import library_root
 
@@ -100,10 +101,9 @@ def _build(sources: Path, folder: Path) -> None:
     with tempfile.TemporaryDirectory(dir=folder.parent) as scratch:
         work, done = Path(scratch, "work"), Path(scratch, "done")
         done.mkdir()
-        revision = f"GIT={firmware_revision():06x}"
-        _run(["make", "-C", str(sources), "mega", f"BUILD={work}", revision])
+        build_image(work)
         shutil.copy(work / IMAGE, done)
-        _run([sys.executable, str(sources / "emulator" / "build_emulator.py"), str(work)])
+        _build_extension(sources / "emulator" / "build_emulator.py", work)
         for extension in work.glob(f"{EXTENSION}*.so"):
             shutil.copy(extension, done)
         try:
@@ -113,10 +113,10 @@ def _build(sources: Path, folder: Path) -> None:
                 raise
 
 
-def _run(command: list[str]) -> None:
+def _build_extension(script: Path, folder: Path) -> None:
+    command = [sys.executable, str(script), str(folder)]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     if result.returncode != 0:
         raise BoardError(
-            f"the emulated board could not be built; '{' '.join(command)}' said:\n"
-            f"{result.stderr[-2000:]}"
+            f"the emulator could not be built; '{' '.join(command)}' said:\n{result.stderr[-2000:]}"
         )
