@@ -27,7 +27,7 @@ TARGET_S = 20.0
 PRESSURES = np.linspace(0.0, 10e3, 11)
 TOLD = (2e3, 4e3, 6e3, 8e3, 10e3)
 NUMBERS = (3, 6, 9, 12)
-PITCH = 11e-3
+PITCH_MM = 11
 DEFAULT = BendingResolution()
 REFINED = {
     "as it is": DEFAULT,
@@ -118,7 +118,9 @@ def growth() -> Iterator[str]:
         start = time.perf_counter()
         actuator = _actuator(
             geometry=BellowBendingGeometry(
-                family="bellow-bending", bellow_number=number, effective_length=PITCH * number
+                family="bellow-bending",
+                bellow_number=number,
+                effective_length=f"{PITCH_MM * number} mm",
             )
         )
         result = follow(actuator.model, [Point(p) for p in (0.0, 1e3, 2e3, 3e3)])
