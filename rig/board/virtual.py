@@ -19,6 +19,7 @@ from rig.board.revision import firmware_revision
 from rig.board.simulated import SimulatedBoard
 from rig.board.truth import TruthFile
 from rig.link.bus import SlcanBus
+from rig.mechanics.job import Job
 from rig.mechanics.profile import side_profile
 from rig.plant.camera import CameraFault, VirtualCamera
 from rig.plant.plant import Fixture, HiddenErrors, Plant, plant_parameters
@@ -63,13 +64,14 @@ def require_simulated(bench: BenchSpec) -> None:
         )
 
 
-def _specimen(setup: Setup, seeds: _Seeds) -> Specimen:
+def _specimen(setup: Setup, seeds: _Seeds, job: Job | None) -> Specimen:
     """The printed actuator that the seeds draw."""
     return draw_specimen(
         setup.actuator,
         setup.material,
         _virtual(setup.bench).specimen,
         np.random.default_rng(seeds.specimen),
+        job,
     )
 
 
@@ -93,10 +95,13 @@ def _plant(setup: Setup, specimen: Specimen, seeds: _Seeds) -> Plant:
     return Plant(parameters, specimen, int(seeds.noise.generate_state(1, np.uint64)[0]))
 
 
-def virtual_board(setup: Setup, seed: int) -> SimulatedBoard:
-    """The board that the bench spec names on a simulated bench, without camera and truth file."""
+def virtual_board(setup: Setup, seed: int, job: Job | None = None) -> SimulatedBoard:
+    """The board that the bench spec names on a simulated bench, without camera and truth file.
+
+    `job` is how the specimen's response is computed.
+    """
     seeds = _Seeds.of(seed, 0)
-    return _board(setup.bench, _plant(setup, _specimen(setup, seeds), seeds))
+    return _board(setup.bench, _plant(setup, _specimen(setup, seeds, job), seeds))
 
 
 def _board(
@@ -142,7 +147,8 @@ class VirtualBench:
 
     `truth_path` is where the truth is written, if anywhere. `segment` is 0 for a new run; a
     resumed run starts at `start_s` with the same specimen and instruments but fresh noise.
-    `faults` are injected while the bench is used; `line` then tells what came of them.
+    `faults` are injected while the bench is used; `line` then tells what came of them. `job` is how
+    the specimen's response is computed.
     """
 
     def __init__(
@@ -154,9 +160,10 @@ class VirtualBench:
         segment: int = 0,
         start_s: float = 0.0,
         faults: FaultScript | None = None,
+        job: Job | None = None,
     ) -> None:
         seeds = _Seeds.of(seed, segment)
-        specimen = _specimen(setup, seeds)
+        specimen = _specimen(setup, seeds, job)
         self.plant = _plant(setup, specimen, seeds)
         self._truth = TruthFile(truth_path) if truth_path is not None else None
         self._board = _board(setup.bench, self.plant, start_s, self._write_truth)

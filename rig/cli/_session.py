@@ -15,6 +15,7 @@ from rich.table import Table
 
 from rig.board.real import RealBench
 from rig.board.virtual import VirtualBench, require_simulated
+from rig.cli._calculation import calculating
 from rig.cli._interruption import catching_signals
 from rig.cli._progress import LABELS, ProgressObserver
 from rig.cli._summary import show_summary
@@ -119,14 +120,16 @@ class Session:
     ) -> Bench:
         setup = self.request.setup
         if setup.bench.simulated:
-            return VirtualBench(
-                setup,
-                self.request.seed,
-                truth_path(folder, segment),
-                segment=segment,
-                start_s=start_s,
-                faults=faults,
-            )
+            with calculating(self.console) as job:
+                return VirtualBench(
+                    setup,
+                    self.request.seed,
+                    truth_path(folder, segment),
+                    segment=segment,
+                    start_s=start_s,
+                    faults=faults,
+                    job=job,
+                )
         _require_measured_calibrations(setup)
         return RealBench(setup.bench, setup.calibrations.camera, self._ask, start_s=start_s)
 
@@ -146,7 +149,8 @@ class Session:
                 outcome = take(observer, interruption.check)
         finally:
             bench.close()
-        summary = build_report(folder)
+        with calculating(self.console) as job:
+            summary = build_report(folder, job=job)
         show_summary(self.console, summary, folder)
         if outcome.error is None:
             return 0

@@ -363,13 +363,17 @@ def serve(
 
         python -m can.viewer -i slcan -c /dev/pts/3   # the port that it prints
     """
+    from rich.console import Console
+
     from rig.board.pty import PtyServer
     from rig.board.virtual import virtual_board
+    from rig.cli._calculation import calculating
     from rig.cli._interruption import catching_signals
     from rig.spec.workspace import Workspace
 
     setup = Workspace.find().setup(actuator, bench)
-    server = PtyServer(virtual_board(setup, seed))
+    with calculating(Console(stderr=True)) as job:
+        server = PtyServer(virtual_board(setup, seed, job))
     if link is not None:
         link.unlink(missing_ok=True)
         link.symlink_to(server.port)

@@ -65,8 +65,9 @@ def predict(
 
     Nothing moves: this only computes.
 
-    Finite elements take a while the first time; their results are kept and found again. Exits 1
-    if a model got no further than some pressure, with what it reached in the table.
+    Finite elements take a while the first time; their results are kept and found again. Where a
+    model got no further than some pressure, cells are empty and a line says why; exits 1 if that
+    is so with the tip free.
 
     Example: `rig predict --actuator models/actuators/bellow-bending.yaml --csv both.csv`
 
@@ -77,6 +78,7 @@ def predict(
     files to open in ParaView and as a page to turn in a browser:
     `rig predict --actuator SPEC --model fe --vtu fields --view fields.html`
     """
+    import numpy as np
     from rich.console import Console
 
     from rig.cli._calculation import calculating
@@ -95,21 +97,29 @@ def predict(
         raise typer.BadParameter(
             "--vtu and --view show the fields of finite elements: add --model fe."
         )
-    table, notes = [], []
+    table, shortfalls, unreached = [], [], False
     with calculating(Console(stderr=True)) as job:
         for name in models:
             response = predict_response(spec, material, name, grid, job)
             table += rows(response if wanted is None else _controlled(response, control, wanted))
-            notes += [f"The model {name} is incomplete: {note}" for note in response.notes]
+            unreached |= bool(np.isnan(response.displacement).any())
+            shortfalls += [f"The model {name} is incomplete: {why}" for why in response.shortfalls]
         if vtu is not None:
             _write_fields(vtu, spec, material, float(grid[-1]), job)
         if view is not None:
             _write_view(view, spec, material, float(grid[-1]), job)
+        margins = []
+        if FINITE_ELEMENTS in models:
+            margins = _margins(spec, material, float(grid[-1]), job)
     _show(spec.name, material.name, table)
+    for line in margins:
+        typer.echo(line)
     if csv is not None:
         _write(csv, table)
-    if notes:
-        raise MechanicsError("\n".join(notes))
+    if unreached:
+        raise MechanicsError("\n".join(shortfalls))
+    for line in shortfalls:
+        typer.echo(line, err=True)
 
 
 def _models(spec: ActuatorSpec, model: str | None) -> list[str]:
@@ -215,6 +225,27 @@ def _write(path: Path, table: list[Row]) -> None:
             f"the table cannot be written to {path}: {error.strerror}. Name a file in an "
             f"existing folder that you may write to."
         ) from None
+
+
+def _margins(spec: ActuatorSpec, material: MaterialSpec, top: float, job: Job) -> list[str]:
+    """How far the material is from tearing at the highest pressure that was solved for."""
+    from rig.mechanics.simulate.prediction import free_inflation
+    from rig.mechanics.strength import safety
+
+    extremes = free_inflation(spec, material).curves(top, job).extremes
+    if not extremes:
+        return []
+    found = safety(extremes[-1], material)
+    governing = found.governing
+    if governing is None:
+        return [
+            f"{material.name} tells neither strength nor elongation at break: no safety factor."
+        ]
+    return [
+        f"Tip free at {found.pressure / 1e3:.4g} kPa: safety {governing.factor:.2g} to "
+        f"{governing.factor_high:.2g}, {governing.bulk_factor:.2g} for 99.5 % of the volume, of "
+        f"{governing.criterion}."
+    ]
 
 
 def _write_fields(

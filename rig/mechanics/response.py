@@ -21,7 +21,7 @@ class Response:
     """Quasi-static response; every array has the shape (n,) of `pressure`, SI units.
 
     A quantity that the model cannot give is None. From the pressure on at which a calculation got
-    no further its values are not a number, and a note says why.
+    no further its values are not a number, and `shortfalls` says why.
     """
 
     model: str
@@ -37,8 +37,8 @@ class Response:
     """Volume of the cavity in m3, tip free."""
     max_von_mises: Array | None = None
     """Largest von Mises stress in Pa, tip free."""
-    notes: tuple[str, ...] = ()
-    """What a reader must know, such as why values are missing."""
+    shortfalls: tuple[str, ...] = ()
+    """Why values are missing, where they are."""
 
     def at(self, pressure: ArrayLike) -> Response:
         """Response at other pressures in Pa, (m,), by monotone cubic interpolation (PCHIP).
@@ -67,7 +67,7 @@ class Response:
             blocked_force=None if self.blocked_force is None else there(self.blocked_force),
             volume=there(self.volume),
             max_von_mises=None if self.max_von_mises is None else there(self.max_von_mises),
-            notes=self.notes,
+            shortfalls=self.shortfalls,
         )
 
     def pressure_for(self, quantity: Literal["angle", "volume"], values: ArrayLike) -> Array:

@@ -27,6 +27,9 @@ SIZE_LIMIT = 2 << 30
 """Bytes that a store may take; the entries used longest ago go first."""
 
 
+_SOURCES = {".py", ".cpp", ".h"}
+
+
 class Store(Protocol):
     """Where arrays are kept between calculations."""
 
@@ -134,7 +137,7 @@ def _code_version() -> str:
     """Hash of the mechanics' source."""
     package = Path(__file__).resolve().parent
     digest = hashlib.sha256()
-    for path in sorted(package.rglob("*.py")):
+    for path in sorted(p for p in package.rglob("*") if p.suffix in _SOURCES):
         digest.update(path.relative_to(package).as_posix().encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()

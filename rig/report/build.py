@@ -97,7 +97,7 @@ def _predictions(data: RunData, job: Job) -> tuple[dict[str, Response], list[str
         except MechanicsError as error:
             notes.append(f"There is no prediction of the model {model}: {error}")
             continue
-        notes += [f"The model {model}: {note}" for note in found[model].notes]
+        notes += [f"The model {model}: {note}" for note in found[model].shortfalls]
     return found, notes
 
 

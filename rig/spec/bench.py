@@ -178,14 +178,27 @@ class SpecimenVariation(SpecModel):
     """How a printed actuator differs from its drawing; standard deviations unless said."""
 
     wall_thickness: Ratio = Field(ge=0, description="relative")
-    young_modulus: Ratio = Field(ge=0, description="relative")
+    young_modulus: Ratio = Field(ge=0, description="relative, of all stiffness")
+    creep: Ratio = Field(ge=0, description="share of the response that comes by creep")
+    creep_time: Duration = Field(gt=0)
+    hysteresis: Ratio = Field(ge=0, description="loop width relative to the response")
+
+
+class FiniteElementSpecimen(SpecimenVariation):
+    """A specimen that obeys finite elements, on a mesh of its own: gravity and stiffening come
+    by themselves."""
+
+    response: Literal["fe"]
+
+
+class BeamSpecimen(SpecimenVariation):
+    """A specimen that obeys beam theory, bent away from it as said here: ready at once."""
+
+    response: Literal["beam"]
     gravity_offset: Angle = Field(description="mean angle at zero pressure")
     gravity_offset_spread: Angle = Field(ge=0)
     stiffening: Ratio = Field(ge=0, description="strength of the nonlinear stiffening, mean")
     stiffening_spread: Ratio = Field(ge=0, description="relative")
-    creep: Ratio = Field(ge=0, description="share of the response that comes by creep")
-    creep_time: Duration = Field(gt=0)
-    hysteresis: Ratio = Field(ge=0, description="loop width relative to the response")
 
 
 class VirtualPneumatics(SpecModel):
@@ -221,7 +234,7 @@ class VirtualOptics(SpecModel):
 class VirtualBench(SpecModel):
     """All that a simulated bench hides from the experiment."""
 
-    specimen: SpecimenVariation
+    specimen: Annotated[FiniteElementSpecimen | BeamSpecimen, Field(discriminator="response")]
     pneumatics: VirtualPneumatics
     sensors: VirtualSensors
     optics: VirtualOptics

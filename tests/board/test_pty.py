@@ -30,7 +30,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @pytest.fixture
 def port() -> Iterator[str]:
-    server = PtyServer(virtual_board(Workspace(ROOT).setup("bellow-bending"), 1))
+    server = PtyServer(virtual_board(Workspace(ROOT).setup("bellow-bending", "virtual-beam"), 1))
     stop = threading.Event()
     thread = threading.Thread(target=server.serve, args=(stop.is_set,))
     thread.start()

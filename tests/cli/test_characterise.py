@@ -17,7 +17,11 @@ from rig.record.reader import RunReader
 
 from .conftest import ROOT, Command
 
-ACTUATOR = "models/actuators/bellow-bending.yaml"
+ACTUATOR = "tests/specs/bellow-bending.yaml"
+CHARACTERISE = [
+    *(sys.executable, "-m", "rig", "characterise"),
+    *("--actuator", ACTUATOR, "--bench", "virtual-beam"),
+]
 
 
 @pytest.fixture(scope="module")
@@ -30,9 +34,8 @@ def quick_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def characterise(
     folder: Path, *more: str, protocol: str = "quick"
 ) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "rig", "characterise", "--actuator", ACTUATOR]
     return subprocess.run(
-        [*command, "--protocol", protocol, "--out", str(folder), *more],
+        [*CHARACTERISE, "--protocol", protocol, "--out", str(folder), *more],
         cwd=ROOT,
         capture_output=True,
         text=True,
@@ -109,7 +112,7 @@ def test_a_complete_run_has_nothing_to_resume(rig: Command, quick_run: Path) -> 
 def test_ctrl_c_vents_closes_the_log_and_says_how_to_go_on(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     process = subprocess.Popen(
-        [sys.executable, "-m", "rig", "characterise", "--actuator", ACTUATOR, "--out", str(folder)],
+        [*CHARACTERISE, "--out", str(folder)],
         cwd=ROOT,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -148,9 +151,8 @@ def test_a_killed_run_is_completed_by_resume_and_the_report_says_so(
 ) -> None:
     protocol, folder = tmp_path / "sweeps.yaml", tmp_path / "run"
     protocol.write_text(SWEEPS)
-    command = [sys.executable, "-m", "rig", "characterise", "--actuator", ACTUATOR]
     process = subprocess.Popen(
-        [*command, "--protocol", str(protocol), "--out", str(folder)],
+        [*CHARACTERISE, "--protocol", str(protocol), "--out", str(folder)],
         cwd=ROOT,
         stdout=subprocess.DEVNULL,
     )
@@ -188,7 +190,7 @@ def _points(folder: Path) -> int:
 def test_insisting_on_ctrl_c_still_vents(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     process = subprocess.Popen(
-        [sys.executable, "-m", "rig", "characterise", "--actuator", ACTUATOR, "--out", str(folder)],
+        [*CHARACTERISE, "--out", str(folder)],
         cwd=ROOT,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,

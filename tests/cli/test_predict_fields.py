@@ -7,8 +7,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from rig.mechanics.simulate.families import MODELS
-from tests.mechanics.test_simulate_free import BendingTube
+from rig.mechanics.simulate.families import FAMILIES
+from tests.mechanics.test_simulate_inflation import TUBES
 
 from .conftest import Command
 
@@ -18,7 +18,7 @@ SPEC = "models/actuators/bellow-bending.yaml"
 @pytest.fixture(autouse=True)
 def a_small_model(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Stands in for the bellow, which takes longer; results go to a cache of the test's own."""
-    monkeypatch.setitem(MODELS, "bellow-bending", lambda geometry, material: BendingTube())
+    monkeypatch.setitem(FAMILIES, "bellow-bending", TUBES)
     monkeypatch.setenv("RIG_CACHE_DIR", str(tmp_path / "cache"))
 
 

@@ -43,7 +43,7 @@ SHORT: dict[str, Any] = {
 
 
 def make_request(protocol: dict[str, object] = SHORT, seed: int = 1) -> RunRequest:
-    setup = Workspace(ROOT).setup("bellow-bending", "virtual")
+    setup = Workspace(ROOT).setup(ROOT / "tests/specs/bellow-bending.yaml", "virtual-beam")
     # the files behind a run are its attachments: a replaced protocol must be there as well
     spec = ProtocolSpec.model_validate(protocol)
     source = replace(setup.sources["protocol"], spec=spec, text=_yaml(spec))

@@ -22,7 +22,7 @@ def changed(section: str, **fields: Any) -> dict[str, Any]:
 
 
 def test_the_default_plan_is_that_of_the_paper() -> None:
-    setup = Workspace(ROOT).setup("bellow-bending")
+    setup = Workspace(ROOT).setup(ROOT / "tests/specs/bellow-bending.yaml", "virtual-beam")
     plan = make_plan(setup.protocol, setup.actuator, setup.bench)
     up = [k for k in plan.keys if k.direction == "up"]
     assert {k.target_kpa for k in up} == {float(p) for p in range(11)}

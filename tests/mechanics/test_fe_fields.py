@@ -20,7 +20,7 @@ from rig.mechanics.fe import (
     discretise,
     follow,
 )
-from rig.mechanics.fe.extremes import largest_von_mises, summarise, volume_percentile
+from rig.mechanics.fe.extremes import summarise, volume_percentile
 from rig.mechanics.fe.fields import nodal_fields, point_fields, recovered
 from rig.mechanics.hyperelastic import (
     Hyperelastic,
@@ -207,7 +207,6 @@ def test_the_peak_is_where_the_closed_form_has_it() -> None:
     found = summarise(model, solution)
     radial, mises = _wall_stress(INNER, 2)
     assert -radial == pytest.approx(found.pressure, rel=1e-3)
-    assert largest_von_mises(model, solution) == pytest.approx(found.von_mises.value, rel=1e-12)
     for peak in (found.von_mises, found.principal_strain, found.compression):
         assert np.linalg.norm(peak.place) == pytest.approx(INNER)
     assert found.von_mises.value == pytest.approx(mises, rel=0.01)

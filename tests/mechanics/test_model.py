@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from rig.mechanics.response import Response
 from rig.mechanics.table import COLUMNS, rows
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-DEFAULT = REPOSITORY / "models" / "actuators" / "bellow-bending.yaml"
+DEFAULT = Path(__file__).parents[1] / "specs/bellow-bending.yaml"  # beam theory alone
 CONTRACT = (
     "model,pressure_kpa,angle_deg,displacement_mm,blocked_force_g,volume_ml,max_von_mises_kpa"
 )
@@ -218,3 +219,16 @@ def test_predict_explains_what_it_cannot_do(arguments, complaint, capsys):
     said = " ".join(capsys.readouterr().err.replace("│", " ").split())
     assert complaint in said
     assert "Traceback" not in said
+
+
+def test_a_response_that_ended_early_is_not_a_number_from_there_on(default_actuator, agilus30):
+    whole = predict(default_actuator, agilus30, "beam", np.arange(0.0, 5e3, 1e3))
+    cut = replace(whole, angle=np.where(whole.pressure > 2e3, np.nan, whole.angle))
+    there = cut.at([0.0, 1.5e3, 2e3, 2.5e3, 4e3])
+    known = np.interp([0.0, 1.5e3, 2e3], whole.pressure, whole.angle)  # beam theory is linear
+    np.testing.assert_allclose(there.angle[:3], known, rtol=1e-12)
+    assert np.all(np.isnan(there.angle[3:]))
+    assert np.all(np.isfinite(there.volume))
+    assert cut.pressure_for("angle", [known[1]]) == pytest.approx([1.5e3])
+    with pytest.raises(MechanicsError, match=r"between 0 and 2 kPa"):
+        cut.pressure_for("angle", [whole.angle[3]])

@@ -281,7 +281,7 @@ def test_transducer_noise_has_the_stated_deviation() -> None:
 
 def test_the_plant_has_every_imperfection_that_the_bench_states() -> None:
     library = Workspace(Path(__file__).resolve().parents[2])
-    setup = library.setup("bellow-bending")
+    setup = library.setup("bellow-bending", "virtual-beam")
     bench, virtual = setup.bench, setup.bench.virtual
     assert virtual is not None
     rng = np.random.default_rng(1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -233,3 +234,25 @@ def test_without_predictions_there_are_no_models(run_folder: Path) -> None:
 )
 def test_numbers_keep_six_digits(value: float, expected: float) -> None:
     assert str(rounded(value)) == str(expected)
+
+
+def test_a_model_that_ended_early_is_compared_where_it_answers(run_folder: Path) -> None:
+    setup = library_setup()
+    pressures = np.linspace(0.0, 10e3, 101)
+    whole = predict(setup.actuator, setup.material, "beam", pressures)
+    gone = pressures > 5e3
+    cut = replace(
+        whole,
+        angle=np.where(gone, np.nan, whole.angle),
+        blocked_force=np.full_like(pressures, np.nan),
+        shortfalls=("the path stopped at 5 kPa",),
+    )
+    reader = RunReader(run_folder)
+    experiments = build_summary(reader, {"cut": cut, "whole": whole}).experiments
+    found = experiments["deformation"].models["cut"]
+    assert [e.pressure_kpa for e in found.errors] == [0, 2.5, 5]
+    same = experiments["deformation"].models["whole"].errors[:3]
+    # a mean pressure just above the end counts as the end
+    assert [e.error for e in found.errors] == pytest.approx([e.error for e in same], abs=0.01)
+    assert all(np.isfinite(e.u_validation) for e in found.errors)
+    assert list(experiments["blocked_force"].models) == ["whole"]

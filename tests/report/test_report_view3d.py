@@ -30,7 +30,7 @@ from rig.mechanics.fe import (
 from rig.mechanics.fe.surface import surface_of
 from rig.mechanics.hyperelastic import NeoHookean, QuadraticVolume
 from rig.mechanics.job import Job
-from rig.mechanics.simulate.families import MODELS
+from rig.mechanics.simulate.families import FAMILIES, Family, Meshing
 from rig.record.reader import RunReader
 from rig.report import view3d
 from rig.report.build import analyse
@@ -42,7 +42,7 @@ from rig.spec.loading import load_actuator
 from rig.spec.material import MaterialSpec
 from rig.spec.workspace import Workspace
 from tests.mechanics.fe_problems import BULK, SHEAR, bending_tube, ring
-from tests.mechanics.test_simulate_free import BendingTube
+from tests.mechanics.test_simulate_inflation import TUBES, BendingTube
 
 LIBRARY = Path(__file__).resolve().parents[2] / "models"
 ACTUATOR = LIBRARY / "actuators" / "bellow-bending.yaml"
@@ -72,7 +72,7 @@ def specs() -> tuple[ActuatorSpec, MaterialSpec]:
 @pytest.fixture(scope="module")
 def section(specs: tuple[ActuatorSpec, MaterialSpec]) -> StrengthSection:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(MODELS, "bellow-bending", lambda geometry, material: BendingTube())
+        patch.setitem(FAMILIES, "bellow-bending", TUBES)
         return strength_section(*specs, TOP, Job())
 
 
@@ -189,7 +189,7 @@ def test_a_material_without_strength_gets_no_factors(
     specs: tuple[ActuatorSpec, MaterialSpec], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     actuator, material = specs
-    monkeypatch.setitem(MODELS, "bellow-bending", lambda geometry, material: BendingTube())
+    monkeypatch.setitem(FAMILIES, "bellow-bending", TUBES)
     bare = material.model_copy(update={"tensile_strength": None, "elongation_at_break": None})
     found = strength_section(actuator, bare, 1e3, Job())
     assert found.criteria == ()
@@ -205,8 +205,9 @@ def test_a_model_in_the_plane_has_factors_but_nothing_to_turn(
     bore = PressureSurface(d, d.facets_on("bore"))
     actuator = BendingTube()
     actuator.model = Model(d, [solid], supports=[base], surface=bore)
-    actuator.angle = actuator.displacement = lambda state: 0.0
-    monkeypatch.setitem(MODELS, "bellow-bending", lambda geometry, material: actuator)
+    actuator.measures = lambda solution: {"displacement": 0.0, "volume": solution.volume}
+    flat = Family(Meshing(lambda geometry, material: actuator))
+    monkeypatch.setitem(FAMILIES, "bellow-bending", flat)
     found = strength_section(*specs, 1e3, Job())
     assert found.view is None
     assert found.rows[-1].von_mises_kpa > 0.5

@@ -105,7 +105,7 @@ def test_every_shipped_file_obeys_its_schema(path: Path) -> None:
         ("models/actuators/bellow-bending.yaml", "66 mm", "-66"),
         ("models/actuators/bellow-bending.yaml", "66 mm", "true"),
         ("models/actuators/bellow-bending.yaml", "66 mm", "long"),
-        ("models/actuators/bellow-bending.yaml", "[beam]", "[beem]"),
+        ("models/actuators/bellow-bending.yaml", "[beam, fe]", "[beem, fe]"),
         ("models/actuators/bellow-bending.yaml", "material: agilus30", ""),
         ("models/benches/virtual.yaml", "23 degC", "-274"),
         ("models/benches/virtual.yaml", "{kind: virtual}", "{kind: vrtual}"),

@@ -16,7 +16,7 @@ from rig.mechanics.fe.control import (
 )
 from rig.mechanics.fe.discretisation import Discretisation, Kinematics, discretise
 from rig.mechanics.fe.errors import FiniteElementError, MeshError
-from rig.mechanics.fe.extremes import Extremes, Peak, largest_von_mises, summarise
+from rig.mechanics.fe.extremes import Extremes, Peak, summarise
 from rig.mechanics.fe.fields import Fields, NodalFields, nodal_fields
 from rig.mechanics.fe.loads import gravity, traction
 from rig.mechanics.fe.model import Model, Support
@@ -57,7 +57,6 @@ __all__ = [
     "discretise",
     "follow",
     "gravity",
-    "largest_von_mises",
     "nodal_fields",
     "rotation_vector",
     "summarise",

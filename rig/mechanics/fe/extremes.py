@@ -8,7 +8,7 @@ it has a limit as the mesh is refined, notch or not, because the volume above a 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +17,8 @@ from rig.mechanics.fe.fields import (
     Fields,
     NodalFields,
     PointFields,
-    Recovery,
     all_point_fields,
-    cauchy_stress,
     recovered,
-    von_mises,
 )
 from rig.mechanics.fe.model import Model
 from rig.mechanics.fe.notches import near_notches
@@ -67,20 +64,15 @@ class Extremes:
     """Largest shortening, 1 less the smallest principal stretch."""
 
 
+PEAKS = tuple(field.name for field in fields(Extremes) if field.name != "pressure")
+"""Names of the peaks in Extremes."""
+
+
 def summarise(model: Model, solution: Solution) -> Extremes:
     """Largest stresses and strains of a model at one of its solutions."""
     inside = all_point_fields(model, solution.state)
     outside = [recovered(s, at) for s, at in zip(model.solids, inside, strict=True)]
     return extremes_of(model, solution.pressure, inside, outside)
-
-
-def largest_von_mises(model: Model, solution: Solution) -> float:
-    """`summarise(...).von_mises.value` in Pa alone, at a fraction of the cost."""
-    state = solution.state
-    return max(
-        float(von_mises(Recovery(solid).tensor(cauchy_stress(solid, state.x, points))).max())
-        for solid, points in zip(model.solids, state.points, strict=True)
-    )
 
 
 def extremes_of(

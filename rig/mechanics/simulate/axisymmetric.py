@@ -15,7 +15,7 @@ from rig.mechanics.fe import (
     Model,
     PressureSurface,
     Solid,
-    State,
+    Solution,
     Support,
     discretise,
 )
@@ -41,18 +41,13 @@ class AxisymmetricModel:
     mirror: None = None
     """Nothing is mirrored."""
 
-    def angle(self, _state: State) -> None:
-        """It does not bend."""
-        return
-
-    def displacement(self, state: State) -> float:
-        """Rise of the top's centre in m."""
+    def measures(self, solution: Solution) -> dict[str, float]:
+        """Displacement (rise of the top's centre) and volume; it does not bend."""
         d = self.model.discretisation
-        return float(state.x[d.dim * self.top_centre + 1])
-
-    def volume(self, modelled: float) -> float:
-        """Volume of the cavity in m3: the meridian stands for the full turn."""
-        return modelled
+        return {
+            "displacement": float(solution.state.x[d.dim * self.top_centre + 1]),
+            "volume": solution.volume,
+        }
 
 
 def axisymmetric_model(

@@ -20,6 +20,7 @@ from rig.mechanics.fe import (
     PressureSurface,
     RigidBody,
     Solid,
+    Solution,
     State,
     Support,
     discretise,
@@ -88,9 +89,17 @@ class BendingModel:
         shape = self.shape
         return self.angle(state) * (2 * shape.outer_radius + shape.bottom_thickness)
 
-    def volume(self, modelled: float) -> float:
-        """Volume of the whole cavity in m3 from that of the modelled half."""
-        return 2 * modelled
+    def volume(self, solution: Solution) -> float:
+        """Volume of the whole cavity in m3."""
+        return 2 * solution.volume
+
+    def measures(self, solution: Solution) -> dict[str, float]:
+        """Angle, displacement and volume, as `Response` has them."""
+        return {
+            "angle": self.angle(solution.state),
+            "displacement": self.displacement(solution.state),
+            "volume": self.volume(solution),
+        }
 
 
 def bending_model(

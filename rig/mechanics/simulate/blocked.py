@@ -3,31 +3,22 @@
 The stop is the toolbox's (Yao, He and Maiolino): a rigid, frictionless plane facing up, where the
 far lower edge of the *undeformed* end cap just touches it, so that the actuator is held straight
 and its tip may slide and turn. Gravity acts on the hanging actuator: its weight hangs above the
-stiff floor and bends it on to the stop before any pressure does. That preload is the weight's, not
-the actuator's; like the bench, which reads zero at zero pressure, forces are reported less it.
+stiff floor and bends it on to the stop before any pressure does.
 
 Only the cap's far lower edge touches: the blocked actuator bows away from the stop, and its cap
-turns with the bending, which lifts the soft underside behind the edge. `Blocked.clearance` tells.
+turns with the bending, which lifts the soft underside behind the edge. `clearance` among the
+measures tells by how much.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig.mechanics.bellow import BellowShape
-from rig.mechanics.fe import (
-    Discretisation,
-    Options,
-    Point,
-    PressureControl,
-    Progress,
-    Result,
-    follow,
-)
+from rig.mechanics.fe import Discretisation, Model, Options, Solution
 from rig.mechanics.mesh.bellow_bending import BendingResolution
 from rig.mechanics.simulate.bending import HANGING, BendingModel, bending_model
 from rig.spec.actuator import BellowBendingGeometry
@@ -37,51 +28,51 @@ Array = NDArray[np.float64]
 
 STOP_STIFFNESS = 1e4
 """N/m of half the stop: it yields 16 um to 32 g, 4e-4 of the way that it holds back."""
-BLOCKED_OPTIONS = Options(mixed_points=False)
-"""Compression and the stop's constraint suit plain Newton: independent strains diverge here."""
+BLOCKED_OPTIONS = Options(mixed_points=False, least_step=1 / 8)
+"""Compression and the stop's constraint suit plain Newton: independent strains diverge here. Where
+an eighth of a rung is too far a crease is near, and smaller steps only come closer to it."""
 
 
 @dataclass(frozen=True)
-class Blocked:
-    """The blocked actuator at the pressures that were reached, in the order asked for."""
+class BlockedBendingModel:
+    """Half of the actuator with its tip over the stop."""
 
-    pressure: Array
-    """Gauge pressure in Pa, (n,); shorter than asked for where `failure` says why."""
-    force: Array
-    """Force of the whole actuator on the stop in N, less `preload`, (n,)."""
-    preload: float
-    """Force on the stop at zero pressure in N: the hanging weight's."""
-    angle: Array
-    """What the cap turns while its edge rests on the stop, in rad, (n,)."""
-    volume: Array
-    """Volume of the whole cavity in m3, (n,)."""
-    clearance: Array
-    """Least height of the soft underside over the stop's disc in m, (n,): positive, or the force
-    of an edge alone is too small."""
-    failure: str | None
-    """Where and why the pressures ended early; None where all were reached."""
     bending: BendingModel
-    """The half model behind the numbers."""
-    result: Result
-    """Its solutions, the first at zero pressure, and how they were found."""
+    stop: TipStop
+
+    @property
+    def model(self) -> Model:
+        """The model, stop included."""
+        return self.bending.model
+
+    @property
+    def mirror(self) -> int:
+        """The half is mirrored across y = 0."""
+        return self.bending.mirror
+
+    def measures(self, solution: Solution) -> dict[str, float]:
+        """Force of the whole actuator on the stop in N, the hanging weight's included; what the
+        cap turns in rad while its edge rests there; volume of the cavity in m3; and the least
+        height of the soft underside over the stop's disc in m: where it is not positive, the force
+        of an edge alone is too small."""
+        state = solution.state
+        return {
+            "force": 2 * self.stop.force(state.x),
+            "angle": self.bending.angle(state),
+            "volume": self.bending.volume(solution),
+            "clearance": _clearance(self.bending, state.x),
+        }
 
 
-def blocked(
+def blocked_bending_model(
     geometry: BellowBendingGeometry,
     material: MaterialSpec,
-    pressures: Sequence[float],
     *,
     resolution: BendingResolution | None = None,
     acceleration: tuple[float, float, float] = HANGING,
     cap_density: float | None = None,
-    options: Options = BLOCKED_OPTIONS,
-    progress: Callable[[Progress], bool] | None = None,
-) -> Blocked:
-    """Force on the stop at gauge pressures in Pa; arguments as for `bending_model` and `follow`.
-
-    A pressure that cannot be reached is no exception: `failure` says where and why, and the
-    pressures before it are kept. Raises MechanicsError as `bending_model` does.
-    """
+) -> BlockedBendingModel:
+    """`bending_model` with the stop under its tip; arguments and errors are the same."""
     stops: list[TipStop] = []
 
     def stop(discretisation: Discretisation, shape: BellowShape) -> tuple[TipStop]:
@@ -96,23 +87,7 @@ def blocked(
         cap_density=cap_density,
         items=stop,
     )
-    points = [Point(0.0), *(Point(float(p)) for p in pressures)]
-    result = follow(bending.model, points, PressureControl(), options=options, progress=progress)
-    # at least the point of zero pressure, or nothing at all
-    forces = np.array([2 * stops[0].force(s.state.x) for s in result.solutions])
-    reached = result.solutions[1:]
-    preload = float(forces[0]) if len(forces) else 0.0
-    return Blocked(
-        pressure=np.array([s.pressure for s in reached]),
-        force=forces[1:] - preload,
-        preload=preload,
-        angle=np.array([bending.angle(s.state) for s in reached]),
-        volume=np.array([bending.volume(s.volume) for s in reached]),
-        clearance=np.array([_clearance(bending, s.state.x) for s in reached]),
-        failure=result.failure,
-        bending=bending,
-        result=result,
-    )
+    return BlockedBendingModel(bending, stops[0])
 
 
 class TipStop:

@@ -3,15 +3,56 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
+from rig.mechanics.fe import Options
+from rig.mechanics.mesh.bellow_bending import BendingResolution
 from rig.mechanics.simulate.axisymmetric import axisymmetric_model
 from rig.mechanics.simulate.bending import bending_model
-from rig.mechanics.simulate.free import ActuatorModel
+from rig.mechanics.simulate.blocked import BLOCKED_OPTIONS, blocked_bending_model
+from rig.mechanics.simulate.inflation import ActuatorModel
 from rig.spec.material import MaterialSpec
 
-MODELS: dict[str, Callable[[Any, MaterialSpec], ActuatorModel]] = {
-    "bellow-axisymmetric": axisymmetric_model,
-    "bellow-bending": bending_model,
+Build = Callable[[Any, MaterialSpec], ActuatorModel]
+"""Geometry and material to the model."""
+
+
+@dataclass(frozen=True)
+class Meshing:
+    """The experiments of an actuator on meshes of one fineness."""
+
+    free: Build
+    """Tip free."""
+    blocked: Build | None = None
+    """Tip held by a stop, whose force is a measure; None where the family has no such thing."""
+    blocked_options: Options = field(default_factory=Options)
+    """Newton's method for the latter."""
+
+
+@dataclass(frozen=True)
+class Family:
+    """How the actuators of one geometry family are modelled."""
+
+    model: Meshing
+    """As predictions are made."""
+    specimen: Meshing | None = None
+    """Coarser, for the virtual specimen: it must not be the model that is validated. None of a
+    family that no bench measures yet."""
+
+
+_COARSE_BENDING = BendingResolution(wall=1, crown=4)
+
+FAMILIES: dict[str, Family] = {
+    "bellow-axisymmetric": Family(model=Meshing(axisymmetric_model)),
+    "bellow-bending": Family(
+        model=Meshing(bending_model, blocked_bending_model, BLOCKED_OPTIONS),
+        specimen=Meshing(
+            partial(bending_model, resolution=_COARSE_BENDING),
+            partial(blocked_bending_model, resolution=_COARSE_BENDING),
+            BLOCKED_OPTIONS,
+        ),
+    ),
 }
-"""Geometry and material to the model, by family."""
+"""Families that have a finite element model, by name."""

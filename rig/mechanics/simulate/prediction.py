@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from rig.mechanics.errors import MechanicsError
 from rig.mechanics.job import Job
 from rig.mechanics.response import Response, interpolated
-from rig.mechanics.simulate.families import MODELS
-from rig.mechanics.simulate.free import FreeInflation
+from rig.mechanics.simulate.families import FAMILIES, Meshing
+from rig.mechanics.simulate.inflation import Curves, Inflation
 from rig.mechanics.store import content_key
 from rig.spec.actuator import ActuatorSpec
 from rig.spec.material import MaterialSpec
@@ -17,18 +17,61 @@ from rig.spec.material import MaterialSpec
 Array = NDArray[np.float64]
 
 
-def free_inflation(actuator: ActuatorSpec, material: MaterialSpec) -> FreeInflation:
-    """The actuator of a family in MODELS, inflated with its tip free."""
+def free_inflation(
+    actuator: ActuatorSpec, material: MaterialSpec, *, specimen: bool = False
+) -> Inflation:
+    """The actuator of a family in FAMILIES, inflated with its tip free.
+
+    `specimen` takes the mesh of virtual specimens.
+    """
     geometry = actuator.geometry
-    build = MODELS[geometry.family]
-    limit = actuator.limits.pressure
-    key = content_key(
-        experiment="free",
-        geometry=geometry.model_dump(mode="json"),
-        material=material.model_dump(mode="json"),
-        limit=limit,
+    build = _meshing(actuator, specimen).free
+    return Inflation(
+        "tip free",
+        lambda: build(geometry, material),
+        _key("free", actuator, material, specimen),
+        actuator.limits.pressure,
     )
-    return FreeInflation(lambda: build(geometry, material), key, limit)
+
+
+def blocked_inflation(
+    actuator: ActuatorSpec, material: MaterialSpec, *, specimen: bool = False
+) -> Inflation | None:
+    """The same with its tip held by a stop; None of a family that is not measured so."""
+    geometry = actuator.geometry
+    meshing = _meshing(actuator, specimen)
+    build = meshing.blocked
+    if build is None:
+        return None
+    return Inflation(
+        "tip blocked",
+        lambda: build(geometry, material),
+        _key("blocked", actuator, material, specimen),
+        actuator.limits.pressure,
+        meshing.blocked_options,
+    )
+
+
+def _meshing(actuator: ActuatorSpec, specimen: bool) -> Meshing:
+    family = FAMILIES[actuator.geometry.family]
+    if not specimen:
+        return family.model
+    if family.specimen is None:
+        raise MechanicsError(
+            f"there is no virtual specimen of the family '{actuator.geometry.family}' yet: it can "
+            "be predicted and exported, not characterised on the virtual bench."
+        )
+    return family.specimen
+
+
+def _key(experiment: str, actuator: ActuatorSpec, material: MaterialSpec, specimen: bool) -> str:
+    return content_key(
+        experiment=experiment,
+        geometry=actuator.geometry.model_dump(mode="json"),
+        material=material.model_dump(mode="json"),
+        limit=actuator.limits.pressure,
+        specimen=specimen,
+    )
 
 
 def finite_element_response(
@@ -36,26 +79,40 @@ def finite_element_response(
 ) -> Response:
     """The response at `pressures` in Pa, (n,), ascending.
 
-    Not a number beyond the pressure that the calculation reached. Raises MechanicsError where it
+    The blocked force is that beyond the hanging weight's, which is there without pressure. Not a
+    number beyond the pressures that the calculations reached. Raises MechanicsError where one
     reached none.
     """
-    curves = free_inflation(actuator, material).curves(float(pressures[-1]), job)
-    if not curves.pressure.size:
-        raise MechanicsError(
-            f"the finite elements of '{actuator.name}' found no equilibrium, not even at 0 kPa: "
-            f"{curves.stopped}"
-        )
+    top = float(pressures[-1])
+    free = free_inflation(actuator, material).curves(top, job)
+    held = blocked_inflation(actuator, material)
+    blocked = held.curves(top, job) if held is not None else None
+    answers = [("tip free", free)] + ([("tip blocked", blocked)] if blocked is not None else [])
+    for name, curves in answers:
+        if not curves.pressure.size:
+            raise MechanicsError(
+                f"the finite elements of '{actuator.name}' found no equilibrium, not even at "
+                f"0 kPa, {name}: {curves.stopped}"
+            )
 
     def at(values: Array) -> Array:
-        return interpolated(curves.pressure, values, pressures)
+        return interpolated(free.pressure, values, pressures)
 
+    measured = free.measured
     return Response(
         model="fe",
         pressure=pressures,
-        angle=None if curves.angle is None else at(curves.angle),
-        displacement=at(curves.displacement),
-        blocked_force=None,
-        volume=at(curves.volume),
-        max_von_mises=at(curves.max_von_mises),
-        notes=() if curves.stopped is None else (curves.stopped,),
+        angle=at(measured["angle"]) if "angle" in measured else None,
+        displacement=at(measured["displacement"]),
+        blocked_force=None if blocked is None else _beyond_the_weight(blocked, pressures),
+        volume=at(measured["volume"]),
+        max_von_mises=at(np.array([e.von_mises.value for e in free.extremes])),
+        shortfalls=tuple(
+            f"{name}: {curves.stopped}" for name, curves in answers if curves.stopped is not None
+        ),
     )
+
+
+def _beyond_the_weight(blocked: Curves, pressures: Array) -> Array:
+    force = blocked.measured["force"]
+    return interpolated(blocked.pressure, force - force[0], pressures)

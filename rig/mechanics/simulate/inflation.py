@@ -1,4 +1,4 @@
-"""An actuator inflated with its tip free: equilibria at rungs of pressure, kept in a store.
+"""An actuator inflated: equilibria at rungs of pressure, kept in a store.
 
 Rungs are a twelfth of the actuator's pressure limit apart, whatever pressures were asked for, so
 that every later question is answered by the same entry; between rungs `Response` interpolates.
@@ -6,14 +6,15 @@ that every later question is answered by the same entry; between rungs `Response
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.mechanics.fe import Model, Point, Solution, State, follow, largest_von_mises
+from rig.mechanics.fe import Model, Options, Point, Solution, State, follow
+from rig.mechanics.fe.extremes import PEAKS, Extremes, Peak, summarise
 from rig.mechanics.fe.state import PointState, Pose
 from rig.mechanics.job import Job
 from rig.mechanics.store import Entry
@@ -23,9 +24,12 @@ Array = NDArray[np.float64]
 RUNGS = 12
 """Rungs up to the actuator's pressure limit."""
 
+_MEASURE, _MODES = "measure ", "modes "
+"""How names of arrays in an entry begin, of what is measured and of each solid's pressures."""
+
 
 class ActuatorModel(Protocol):
-    """A family's finite element model, with what turns its state into what labs measure."""
+    """An actuator in one experiment as a finite element model."""
 
     @property
     def model(self) -> Model:
@@ -37,53 +41,56 @@ class ActuatorModel(Protocol):
         """Axis across whose plane through the origin the body is mirrored; None if it is whole."""
         ...
 
-    def angle(self, state: State, /) -> float | None:
-        """Bending angle in rad; None of a family that does not bend."""
-        ...
-
-    def displacement(self, state: State, /) -> float:
-        """The family's displacement in m, as `Response.displacement` says."""
-        ...
-
-    def volume(self, modelled: float, /) -> float:
-        """Volume of the whole cavity in m3 from that of the modelled part."""
+    def measures(self, solution: Solution, /) -> Mapping[str, float]:
+        """What labs measure, SI units, by names that are the same for all solutions; those of
+        `rig.mechanics.response.Response` where it has them."""
         ...
 
 
 @dataclass(frozen=True)
-class FreeCurves:
-    """The response at the rungs that were reached, each (k,), SI units."""
+class Curves:
+    """The response at the k rungs that were reached."""
 
     pressure: Array
-    angle: Array | None
-    displacement: Array
-    volume: Array
-    max_von_mises: Array
+    """In Pa, (k,)."""
+    measured: Mapping[str, Array]
+    """What the model measures, each (k,)."""
+    extremes: tuple[Extremes, ...]
+    """Largest stresses and strains."""
     stopped: str | None
     """Why there are no more rungs; None where all that were asked for were reached."""
+    cancelled: bool
+    """Whether that was because somebody stopped it."""
 
 
 @dataclass(frozen=True)
-class FreeInflation:
+class Inflation:
     """One question: an actuator's model, where its answer is kept, what it may be asked."""
 
+    name: str
+    """What a watcher reads."""
     build: Callable[[], ActuatorModel]
     key: str
     limit: float
     """Pressure limit of the actuator in Pa."""
+    options: Options = field(default_factory=Options)
+    """Of Newton's method."""
 
-    def curves(self, top: float, job: Job) -> FreeCurves:
+    def curves(self, top: float, job: Job) -> Curves:
         """The response up to the rung at or above `top` in Pa."""
         entry = self._entry(top, job)
         count = int(np.searchsorted(entry["pressure"], self._rungs(top)[-1] * (1 + 1e-9)))
         stopped = str(entry["stopped"]) if count < len(self._rungs(top)) else ""
-        return FreeCurves(
+        return Curves(
             pressure=entry["pressure"][:count],
-            angle=entry["angle"][:count] if "angle" in entry else None,
-            displacement=entry["displacement"][:count],
-            volume=entry["volume"][:count],
-            max_von_mises=entry["max_von_mises"][:count],
+            measured={
+                name.removeprefix(_MEASURE): values[:count]
+                for name, values in entry.items()
+                if name.startswith(_MEASURE)
+            },
+            extremes=_extremes(entry)[:count],
             stopped=stopped or None,
+            cancelled=bool(stopped) and not entry["final"],
         )
 
     def solutions(self, top: float, job: Job) -> tuple[ActuatorModel, tuple[Solution, ...]]:
@@ -109,8 +116,9 @@ class FreeInflation:
         result = follow(
             actuator.model,
             [Point(p) for p in rungs[len(before) :]],
+            options=self.options,
             start=before[-1].state if before else None,
-            progress=job.telling("tip free"),
+            progress=job.telling(self.name),
         )
         entry = _entry_of(actuator, (*before, *result.solutions), result.failure, result.cancelled)
         job.store.save(self.key, entry)
@@ -121,13 +129,16 @@ def _entry_of(
     actuator: ActuatorModel, solutions: tuple[Solution, ...], failure: str | None, cancelled: bool
 ) -> Entry:
     states = [s.state for s in solutions]
-    angles = [angle for s in states if (angle := actuator.angle(s)) is not None]
-    bending = {"angle": np.array(angles)} if len(angles) == len(states) else {}
+    found = [summarise(actuator.model, s) for s in solutions]
+    measured = [actuator.measures(s) for s in solutions]
+    peaks = [[getattr(extremes, name) for name in PEAKS] for extremes in found]
     return {
         "pressure": np.array([s.pressure for s in solutions]),
-        "displacement": np.array([actuator.displacement(s) for s in states]),
-        "volume": np.array([actuator.volume(s.volume) for s in solutions]),
-        "max_von_mises": np.array([largest_von_mises(actuator.model, s) for s in solutions]),
+        "peak_value": np.array([[p.value for p in row] for row in peaks]),
+        "peak_place": np.array([[p.place for p in row] for row in peaks]),
+        "peak_solid": np.array([[p.solid for p in row] for row in peaks]),
+        "peak_at_notch": np.array([[p.at_notch for p in row] for row in peaks]),
+        "peak_bulk": np.array([[p.bulk for p in row] for row in peaks]),
         "stopped": np.array(failure or ""),
         # trying again would end at the same place, unless it was cancelled
         "final": np.array(failure is not None and not cancelled),
@@ -138,15 +149,38 @@ def _entry_of(
         "motion": np.array([s.motion for s in states]),
         "shift": np.array([[p.shift for p in s.poses] for s in states]),
         "rotation": np.array([[p.rotation for p in s.poses] for s in states]),
-        **bending,
-    } | {
-        f"modes_{i}": np.array([s.points[i].pressure for s in states])
-        for i in range(len(actuator.model.solids))
+        **{
+            f"{_MEASURE}{name}": np.array([row[name] for row in measured])
+            for name in (measured[0] if measured else ())
+        },
+        **{
+            f"{_MODES}{i}": np.array([s.points[i].pressure for s in states])
+            for i in range(len(actuator.model.solids))
+        },
     }
 
 
+def _extremes(entry: Entry) -> tuple[Extremes, ...]:
+    return tuple(
+        Extremes(
+            pressure=float(pressure),
+            **{
+                name: Peak(
+                    value=float(entry["peak_value"][k, i]),
+                    place=entry["peak_place"][k, i],
+                    solid=int(entry["peak_solid"][k, i]),
+                    at_notch=bool(entry["peak_at_notch"][k, i]),
+                    bulk=float(entry["peak_bulk"][k, i]),
+                )
+                for i, name in enumerate(PEAKS)
+            },
+        )
+        for k, pressure in enumerate(entry["pressure"])
+    )
+
+
 def _solutions(entry: Entry) -> tuple[Solution, ...]:
-    modes = [entry[f"modes_{i}"] for i in range(sum(name.startswith("modes_") for name in entry))]
+    modes = [entry[name] for name in sorted(entry) if name.startswith(_MODES)]
     return tuple(
         Solution(
             State(
