@@ -74,7 +74,7 @@ def displacements(
     actuator = axisymmetric_model(geometry, material, resolution=resolution, follower=follower)
     result = follow(actuator.model, [Point(p) for p in pressures])
     assert result.failure is None, result.failure
-    return 1e3 * np.array([actuator.displacement(s.state) for s in result.solutions])
+    return 1e3 * np.array([actuator.measures(s)["displacement"] for s in result.solutions])
 
 
 def _rows(name: str) -> list[dict[str, str]]:
