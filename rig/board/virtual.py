@@ -75,6 +75,11 @@ def _specimen(setup: Setup, seeds: _Seeds, job: Job | None) -> Specimen:
     )
 
 
+def specimen_of(setup: Setup, seed: int, job: Job | None = None) -> Specimen:
+    """The printed actuator of a simulated bench; `job` is how its response is computed."""
+    return _specimen(setup, _Seeds.of(seed, 0), job)
+
+
 def _plant(setup: Setup, specimen: Specimen, seeds: _Seeds) -> Plant:
     """The simulated bench around a specimen, with the instrument errors that the seeds draw."""
     bench, calibrations = setup.bench, setup.calibrations

@@ -9,6 +9,7 @@ from pathlib import Path
 from rig.board.virtual import require_simulated
 from rig.campaign.judge import Verdict, judge
 from rig.campaign.scenario import Outcome, run_scenario
+from rig.mechanics.job import Job
 from rig.spec.faults import Expectation, FaultScript
 from rig.spec.workspace import Workspace
 
@@ -16,15 +17,24 @@ from rig.spec.workspace import Workspace
 class Campaign:
     """Runs fault scripts on a bench of the workspace; the same seed gives the same verdicts.
 
-    Raises BoardError for a real bench.
+    `job` is how the specimen's response is computed, if it was not before. Raises BoardError for a
+    real bench.
     """
 
-    def __init__(self, workspace: Workspace, actuator: str, bench: str, seed: int) -> None:
+    def __init__(
+        self,
+        workspace: Workspace,
+        actuator: str,
+        bench: str,
+        seed: int,
+        job: Job | None = None,
+    ) -> None:
         require_simulated(workspace.bench(bench))
         self._workspace = workspace
         self._actuator = actuator
         self._bench = bench
         self._seed = seed
+        self._job = job
         self._healthy: dict[str, Outcome] = {}
 
     def run(self, scripts: Sequence[FaultScript]) -> Iterator[Verdict]:
@@ -46,7 +56,7 @@ class Campaign:
 
     def _take(self, script: FaultScript, folder: Path) -> Outcome:
         setup = self._workspace.setup(self._actuator, self._bench, script.protocol)
-        return run_scenario(script, setup, self._seed, folder / script.name)
+        return run_scenario(script, setup, self._seed, folder / script.name, self._job)
 
 
 def unbroken(name: str, protocol: str) -> FaultScript:

@@ -18,6 +18,7 @@ from rig.experiment.plan import make_plan
 from rig.experiment.run import new_run
 from rig.experiment.setup import RunRequest
 from rig.mechanics.bellow import bending_geometry
+from rig.mechanics.job import Job
 from rig.mechanics.profile import cavity_volume
 from rig.record.documents import PointDocument, PointKey
 from rig.record.errors import RecordError
@@ -86,7 +87,9 @@ class _Told(Nobody):
         self.points.append(point)
 
 
-def run_scenario(script: FaultScript, setup: Setup, seed: int, folder: Path) -> Outcome:
+def run_scenario(
+    script: FaultScript, setup: Setup, seed: int, folder: Path, job: Job | None = None
+) -> Outcome:
     """Take a whole run into `folder` while `script` breaks the simulated bench."""
     geometry = bending_geometry(setup.actuator, "A fault campaign")
     request = RunRequest(
@@ -95,7 +98,7 @@ def run_scenario(script: FaultScript, setup: Setup, seed: int, folder: Path) -> 
         seed=seed,
         cavity_volume=float(cavity_volume(geometry, 0.0)),
     )
-    bench = VirtualBench(setup, seed, folder / "truth.mcap", faults=script)
+    bench = VirtualBench(setup, seed, folder / "truth.mcap", faults=script, job=job)
     line = bench.line
     assert line is not None, "a bench with a script has a faulty line"
     told = _Told()

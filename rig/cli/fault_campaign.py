@@ -44,15 +44,22 @@ def fault_campaign(
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
+    from rig.board.virtual import require_simulated, specimen_of
     from rig.campaign.campaign import Campaign
     from rig.campaign.table import write_tables
+    from rig.cli._calculation import calculating
+    from rig.mechanics.job import Job
     from rig.spec.workspace import Workspace
 
     workspace = Workspace.find()
     names = only or workspace.names("faults")
     scripts = [workspace.faults(name) for name in names]
-    campaign = Campaign(workspace, actuator, bench, seed)
     console = Console()
+    require_simulated(workspace.bench(bench))
+    with calculating(console) as job:
+        # once for all scenarios: from here on the store knows the specimen
+        specimen_of(workspace.setup(actuator, bench), seed, job)
+    campaign = Campaign(workspace, actuator, bench, seed, Job(job.store))
     verdicts: list[Verdict] = []
     bar = Progress(
         TextColumn("{task.description}"),

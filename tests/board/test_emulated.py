@@ -24,6 +24,7 @@ from rig.link.client import RigLink
 from rig.link.schema import load_schema
 from rig.plant.plant import Faults
 from rig.spec.workspace import Setup, Workspace
+from tests.benches import with_beam_specimen
 
 ROOT = Path(__file__).resolve().parents[2]
 OPENING = b"C\rS6\r\rO\rO\r"
@@ -33,7 +34,7 @@ needs_packages = pytest.mark.skipif(bool(MISSING), reason=f"not installed: {', '
 
 @pytest.fixture(scope="module")
 def setup() -> Setup:
-    return Workspace(ROOT).setup("bellow-bending", "emulated")
+    return with_beam_specimen(Workspace(ROOT).setup("bellow-bending", "emulated"))
 
 
 class Emulated:

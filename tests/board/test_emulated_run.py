@@ -21,13 +21,14 @@ from rig.mechanics.profile import cavity_volume
 from rig.record.documents import PointDocument
 from rig.record.reader import RunReader
 from rig.spec.workspace import Workspace
+from tests.benches import with_beam_specimen
 
 ROOT = Path(__file__).resolve().parents[2]
 MISSING = missing_packages()
 
 
 def points(bench_name: str, folder: Path) -> list[PointDocument]:
-    setup = Workspace(ROOT).setup("bellow-bending", bench_name, "faults")
+    setup = with_beam_specimen(Workspace(ROOT).setup("bellow-bending", bench_name, "faults"))
     request = RunRequest(
         setup=setup,
         plan=make_plan(setup.protocol, setup.actuator, setup.bench),

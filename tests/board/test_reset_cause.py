@@ -18,6 +18,7 @@ from rig.board.virtual import virtual_board
 from rig.link.bus import SlcanBus
 from rig.link.client import BoardStatus, RigLink
 from rig.spec.workspace import Workspace
+from tests.benches import with_beam_specimen
 
 ROOT = Path(__file__).resolve().parents[2]
 MISSING = emulator_build.missing_packages()
@@ -46,7 +47,9 @@ class Mega:
 
     def __init__(self, image: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr("rig.board.emulated.firmware_image", lambda: image)
-        board = virtual_board(Workspace(ROOT).setup("bellow-bending", "emulated"), 1)
+        board = virtual_board(
+            with_beam_specimen(Workspace(ROOT).setup("bellow-bending", "emulated")), 1
+        )
         assert isinstance(board, EmulatedBoard)
         self.board = board
         self.link = RigLink(SlcanBus(board))

@@ -39,7 +39,7 @@ Judged = Callable[..., Verdict]
 
 @pytest.fixture(scope="module")
 def judged(tmp_path_factory: pytest.TempPathFactory) -> Judged:
-    campaign = Campaign(LIBRARY, "bellow-bending", "virtual", 1)
+    campaign = Campaign(LIBRARY, "bellow-bending", "virtual-beam", 1)
     known: dict[str, Outcome] = {}
 
     def take(script: FaultScript, *, again: bool = False) -> Verdict:
@@ -65,7 +65,7 @@ def test_a_fault_is_taken_as_required(name: str, judged: Judged) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_every_fault_is_taken_as_required(seed: int) -> None:
-    campaign = Campaign(LIBRARY, "bellow-bending", "virtual", seed)
+    campaign = Campaign(LIBRARY, "bellow-bending", "virtual-beam", seed)
     verdicts = campaign.run([LIBRARY.faults(name) for name in LIBRARY.names("faults")])
     assert {v.outcome.script.name: v.complaints for v in verdicts if not v.passed} == {}
 

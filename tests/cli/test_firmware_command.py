@@ -27,7 +27,7 @@ RULES = load_schema().parameters
 @pytest.fixture
 def port(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     """A board on a pseudo-terminal; nothing resets it when the port is opened."""
-    server = PtyServer(virtual_board(Workspace(ROOT).setup("bellow-bending"), 1))
+    server = PtyServer(virtual_board(Workspace(ROOT).setup("bellow-bending", "virtual-beam"), 1))
     stop = threading.Event()
     thread = threading.Thread(target=server.serve, args=(stop.is_set,))
     thread.start()
@@ -65,12 +65,12 @@ def image(tmp_path: Path) -> Path:
 
 
 def test_identity_tells_who_why_and_how(rig: Command) -> None:
-    facts = json.loads(rig("firmware", "identify", "--bench", "virtual", "--json").out)
+    facts = json.loads(rig("firmware", "identify", "--bench", "virtual-beam", "--json").out)
     assert facts["commit"] == f"{firmware_revision():06x}"
     assert facts["protocol"] == load_schema().protocol_version
     assert facts["schema"] == f"{load_schema().crc:04x}"
     assert (facts["board"], facts["reset_cause"], facts["state"]) == ("host", "power_on", "idle")
-    assert "reset_cause power_on" in rig("firmware", "identify", "--bench", "virtual").out
+    assert "reset_cause power_on" in rig("firmware", "identify", "--bench", "virtual-beam").out
 
 
 def test_a_port_that_is_not_there_is_named_with_those_that_are(rig: Command) -> None:
@@ -130,7 +130,7 @@ def test_a_board_at_work_is_not_flashed_unless_forced(
     [
         (["--port", "/dev/ttyNONE"], "there is no port /dev/ttyNONE"),
         (["--port", "socket://lab:2000"], "expected a serial port of this machine"),
-        (["--bench", "virtual"], "has no serial port"),
+        (["--bench", "virtual-beam"], "has no serial port"),
         (["--port", "/dev/null", "--image", "missing.hex"], "there is no image missing.hex"),
     ],
 )
@@ -173,10 +173,12 @@ def test_what_avrdude_complains_of_is_passed_on(
 
 
 def test_the_list_has_every_parameter_with_its_range(rig: Command) -> None:
-    rows = json.loads(rig("firmware", "parameters", "list", "--bench", "virtual", "--json").out)
+    rows = json.loads(
+        rig("firmware", "parameters", "list", "--bench", "virtual-beam", "--json").out
+    )
     assert [row["name"] for row in rows] == list(RULES)
     assert all(row["low"] <= row["value"] <= row["high"] for row in rows)
-    shown = rig("firmware", "parameters", "list", "--bench", "virtual").out
+    shown = rig("firmware", "parameters", "list", "--bench", "virtual-beam").out
     for name in RULES:
         assert name in shown
 
