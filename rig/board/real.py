@@ -7,8 +7,7 @@ from typing import Literal
 
 from rig.board.camera import OpenCvCamera
 from rig.board.errors import BoardError
-from rig.link.bus import SlcanBus
-from rig.link.serial import SerialTransport
+from rig.link.open import open_bus
 from rig.spec.bench import BenchSpec, OpenCvCameraDevice, SerialBoard
 from rig.spec.calibration import CameraCalibration
 
@@ -39,15 +38,14 @@ class RealBench:
                 f"the bench '{bench.name}' has a real board but a virtual camera; set "
                 "camera.device to kind 'opencv' with the number of the device."
             )
-        transport = SerialTransport(bench.board.port, bench.board.baudrate, start_s=start_s)
-        self.bus = SlcanBus(transport)
+        self.bus = open_bus(bench.board.port, bench.board.baudrate, start_s=start_s)
         try:
             self.camera = OpenCvCamera(
                 bench.camera.device.source,
                 camera.width,
                 camera.height,
                 bench.camera.jpeg_quality,
-                lambda: transport.now_s,
+                lambda: self.bus.now_s,
             )
         except BoardError:
             self.bus.close()

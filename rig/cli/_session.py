@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from rig.board.errors import BoardError
 from rig.board.real import RealBench
 from rig.board.virtual import VirtualBench, require_simulated
 from rig.cli._calculation import calculating
@@ -20,10 +21,12 @@ from rig.cli._interruption import catching_signals
 from rig.cli._progress import LABELS, ProgressObserver
 from rig.cli._summary import show_summary
 from rig.experiment.bench import Bench, Observer
+from rig.experiment.doctor import Finding, look_at_bench, look_at_machine
 from rig.experiment.errors import ExperimentError
 from rig.experiment.plan import make_plan
 from rig.experiment.run import RunOutcome, new_run, resume_run
 from rig.experiment.setup import RunRequest
+from rig.link.errors import LinkError
 from rig.mechanics.bellow import bending_geometry
 from rig.mechanics.profile import cavity_volume
 from rig.record.reader import RunReader
@@ -133,6 +136,13 @@ class Session:
         _require_measured_calibrations(setup)
         return RealBench(setup.bench, setup.calibrations.camera, self._ask, start_s=start_s)
 
+    def open_without_log(self) -> Bench:
+        """The bench, to look at it: nothing is recorded, and calibrations may be anybody's."""
+        setup = self.request.setup
+        if setup.bench.simulated:
+            return VirtualBench(setup, self.request.seed)
+        return RealBench(setup.bench, setup.calibrations.camera, self._ask)
+
     def _ask(self, instruction: str) -> None:
         self.console.input(f"{instruction}, then press Enter. ")
 
@@ -189,6 +199,23 @@ def new_session(
     script = read(workspace.path("faults", faults), FaultScript)
     request = replace(session.request, enclosures={"faults.yaml": script.text})
     return replace(session, request=request, faults=script.spec)
+
+
+def examine(actuator: str, bench: str, seed: int) -> list[Finding]:
+    """What `rig doctor` sees of a bench, by names or files; raises SpecError and LimitError.
+
+    A bench that cannot be opened is a finding, too.
+    """
+    session = new_session(Path(actuator), bench, "default", seed)
+    findings = look_at_machine(session.logs)
+    try:
+        opened = session.open_without_log()
+    except (LinkError, BoardError) as error:
+        return [*findings, Finding("port or camera", "failed", advice=str(error))]
+    try:
+        return findings + look_at_bench(opened, session.request)
+    finally:
+        opened.close()
 
 
 def resumed_session(run: Path) -> Session:

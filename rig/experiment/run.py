@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib import metadata
 from pathlib import Path
 
@@ -182,6 +182,8 @@ def _recorded(context: RunContext, record: RunWriter, done: Collection[PointKey]
         ending = _make_safe(context)
         recorder.flush()
         record.event(link.now_s, "made safe", {"result": ending})
+        lost = {"frames_lost": link.frames_lost}
+        record.event(link.now_s, "link statistics", asdict(link.statistics) | lost)
         record.stop(stop, link.now_s)
     finally:
         if crash is not None:

@@ -10,6 +10,7 @@ import time
 from typing import TYPE_CHECKING, Protocol
 
 from rig.link import slcan
+from rig.link.errors import PortError
 from rig.link.slcan import RawFrame, SlcanParser
 
 if TYPE_CHECKING:
@@ -119,9 +120,9 @@ class SlcanBus:
 class PythonCanBus:
     """Frames over a python-can bus: socketcan, pcan, slcan, ...; bench time is the bus's clock."""
 
-    def __init__(self, bus: can.BusABC) -> None:
+    def __init__(self, bus: can.BusABC, *, start_s: float = 0.0) -> None:
         self._bus = bus
-        self._start_s = time.monotonic()
+        self._start_s = time.monotonic() - start_s
 
     @property
     def name(self) -> str:
@@ -130,21 +131,30 @@ class PythonCanBus:
 
     @property
     def now_s(self) -> float:
-        """Seconds since the bus was wrapped."""
+        """Seconds since the bus was wrapped, plus `start_s`."""
         return time.monotonic() - self._start_s
 
     def send(self, frame_id: int, payload: bytes) -> None:
         """Send a standard data frame."""
         import can
 
-        self._bus.send(can.Message(arbitration_id=frame_id, data=payload, is_extended_id=False))
+        message = can.Message(arbitration_id=frame_id, data=payload, is_extended_id=False)
+        try:
+            self._bus.send(message)
+        except can.CanError as error:
+            raise self._gone(error) from error
 
     def poll(self, duration_s: float) -> list[RawFrame]:
         """Receive for `duration_s`; frames carry the host's time of reception."""
+        import can
+
         end_s = self.now_s + duration_s
         frames: list[RawFrame] = []
         while (left_s := end_s - self.now_s) > 0:
-            message = self._bus.recv(left_s)
+            try:
+                message = self._bus.recv(left_s)
+            except can.CanError as error:
+                raise self._gone(error) from error
             if message is not None and not message.is_extended_id:
                 frames.append(RawFrame(self.now_s, message.arbitration_id, bytes(message.data)))
         return frames
@@ -155,3 +165,9 @@ class PythonCanBus:
     def close(self) -> None:
         """Shut the bus down."""
         self._bus.shutdown()
+
+    def _gone(self, error: Exception) -> PortError:
+        return PortError(
+            f"the CAN adapter {self.name} failed ({error}): was it unplugged, or is the bus off? "
+            "The firmware's own watchdog vents the bench. Mend it, then `rig resume` the run."
+        )

@@ -85,6 +85,16 @@ class LinkStatistics:
     resent_commands: int = 0
     host_stall_s: float = 0.0
     """Longest bench time between two of our heartbeats."""
+    answers: int = 0
+    round_trip_s: float = 0.0
+    """Mean bench time from a request or command to its answer, as far as polls resolve it."""
+    longest_round_trip_s: float = 0.0
+
+    def add_round_trip(self, duration_s: float) -> None:
+        """Note one answer."""
+        self.answers += 1
+        self.round_trip_s += (duration_s - self.round_trip_s) / self.answers
+        self.longest_round_trip_s = max(self.longest_round_trip_s, duration_s)
 
 
 Tap = Callable[[Sequence[RawFrame], Sequence[Message]], None]
@@ -344,6 +354,7 @@ class RigLink:
                 self._send("COMMAND", **values)
             for message in self.receive(ACKNOWLEDGE_POLL_S):
                 if message.name == "HEARTBEAT" and message.values["command_number"] == number:
+                    self.statistics.add_round_trip(self.now_s - sent_s)
                     result = self._results.get(int(message.values["command_result"]), "unknown")
                     if result != "accepted":
                         state = self.status.state if self.status else "unknown"
@@ -438,10 +449,22 @@ class RigLink:
                 self._send(request, number=number, **values)
             for message in self.receive(ACKNOWLEDGE_POLL_S):
                 if message.name == reply and (not numbered or message.values["number"] == number):
+                    self.statistics.add_round_trip(self.now_s - sent_s)
                     return message.values
         raise LinkLostError(
             f"no answer from {self._bus.name} within {timeout_s:g} s: is it a rig board, is it "
             "powered, and is no other program using the port?"
+        )
+
+    def ping(self, resolution_s: float = 0.001, timeout_s: float = 1.0) -> float:
+        """Bench time in seconds from a request to its answer; raises LinkLostError if none."""
+        sent_s = self.now_s
+        self._send("IDENTITY_REQUEST", number=1)
+        while self.now_s < sent_s + timeout_s:
+            if any(m.name == "IDENTITY" for m in self.receive(resolution_s)):
+                return self.now_s - sent_s
+        raise LinkLostError(
+            f"the board at {self._bus.name} did not answer within {timeout_s:g} s; check the cable."
         )
 
     def close(self) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import time
 from pathlib import Path
 
 import serial
 
 from rig.link.errors import PortError
+from rig.link.ports import describe
 
 
 class SerialTransport:
@@ -23,14 +25,14 @@ class SerialTransport:
         Raises PortError when the port does not exist or cannot be opened.
         """
         self._port = port
+        # two programs at one port would each read half of what the board says
+        exclusive = None if "://" in port else True
         try:
-            # exclusive: two programs on one port would each get half of the bytes
-            self._serial = serial.serial_for_url(port, baudrate=baudrate, timeout=0, exclusive=True)
+            self._serial = serial.serial_for_url(
+                port, baudrate=baudrate, timeout=0, exclusive=exclusive
+            )
         except (serial.SerialException, ValueError, OSError) as error:
-            raise PortError(
-                f"the port {port} cannot be opened ({error}). Expected a serial port with the "
-                f"board, as /dev/ttyACM0 or COM3, that no other program uses. {_known_ports()}"
-            ) from error
+            raise PortError(_why_closed(port, error)) from error
         self._zero_s = time.monotonic() - start_s
         if boot_s > 0:
             time.sleep(boot_s)
@@ -89,8 +91,28 @@ def require_port(port: str) -> None:
         )
 
 
+def _why_closed(port: str, error: Exception) -> str:
+    number = getattr(error, "errno", None)
+    if number in (errno.EACCES, errno.EPERM):
+        return (
+            f"the port {port} may not be used by you ({error}). On Linux, join the group that owns "
+            "it, mostly `sudo usermod -a -G dialout $USER`, and log in again."
+        )
+    if number in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in str(error):
+        return (
+            f"the port {port} is in use by another program ({error}). Close the serial monitor, "
+            "the CAN viewer or the other `rig` that holds it."
+        )
+    if "://" in port:
+        return f"{port} cannot be opened ({error}). Check host, port number and what listens there."
+    return (
+        f"the port {port} cannot be opened ({error}). Expected a serial port with the board, as "
+        f"/dev/ttyACM0 or COM3, or `auto`. {_known_ports()}"
+    )
+
+
 def _known_ports() -> str:
     from serial.tools import list_ports
 
-    ports = [port.device for port in list_ports.comports()]
-    return f"Ports of this machine: {', '.join(ports)}." if ports else "This machine has no ports."
+    ports = describe(list_ports.comports())
+    return f"Ports of this machine: {ports}." if ports else "This machine has no ports."

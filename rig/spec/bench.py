@@ -43,10 +43,13 @@ class EmulatedBoard(SpecModel):
 
 
 class SerialBoard(SpecModel):
-    """An Arduino Mega on a serial port, or any pyserial URL."""
+    """An Arduino Mega on a serial port, any pyserial URL, or behind a CAN adapter."""
 
     kind: Literal["serial"]
-    port: str = Field(min_length=1, description="as /dev/ttyACM0, COM3 or socket://host:port")
+    port: str = Field(
+        min_length=1,
+        description="auto, or as /dev/ttyACM0, COM3, socket://host:port, can:socketcan:can0",
+    )
     baudrate: Count = Field(115200, le=20_000_000)
 
 

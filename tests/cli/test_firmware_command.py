@@ -87,7 +87,7 @@ def test_a_port_that_another_program_uses_is_left_alone(rig: Command, port: str)
     finally:
         user.close()
     assert outcome.code == 1
-    assert "that no other program uses" in " ".join(outcome.err.split())
+    assert "in use by another program" in " ".join(outcome.err.split())
 
 
 # --- flashing -----------------------------------------------------------------------------------
