@@ -18,6 +18,7 @@ from rig.board.emulator_build import firmware_image
 from rig.board.virtual import VirtualBench
 from rig.link.client import RigLink
 from rig.spec.workspace import Workspace
+from tests.benches import with_beam_specimen
 
 ROOT = Path(__file__).resolve().parents[2]
 TICK_CYCLES = 32_000
@@ -41,7 +42,9 @@ class Measurement:
     """An emulated bench, homed and zeroed, on which stretches are measured."""
 
     def __init__(self) -> None:
-        self.bench = VirtualBench(Workspace(ROOT).setup("bellow-bending", "emulated"), 1)
+        self.bench = VirtualBench(
+            with_beam_specimen(Workspace(ROOT).setup("bellow-bending", "emulated")), 1
+        )
         assert isinstance(self.bench.board, EmulatedBoard)
         self.board = self.bench.board
         self.link = RigLink(self.bench.bus)

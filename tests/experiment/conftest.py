@@ -19,6 +19,7 @@ from rig.mechanics.profile import cavity_volume
 from rig.record.reader import RunReader
 from rig.spec.protocol import ProtocolSpec
 from rig.spec.workspace import Workspace
+from tests.benches import BEAM_ACTUATOR
 
 ROOT = Path(__file__).resolve().parents[2]
 SHORT: dict[str, Any] = {
@@ -43,7 +44,7 @@ SHORT: dict[str, Any] = {
 
 
 def make_request(protocol: dict[str, object] = SHORT, seed: int = 1) -> RunRequest:
-    setup = Workspace(ROOT).setup(ROOT / "tests/specs/bellow-bending.yaml", "virtual-beam")
+    setup = Workspace(ROOT).setup(BEAM_ACTUATOR, "virtual-beam")
     # the files behind a run are its attachments: a replaced protocol must be there as well
     spec = ProtocolSpec.model_validate(protocol)
     source = replace(setup.sources["protocol"], spec=spec, text=_yaml(spec))

@@ -10,6 +10,7 @@ import pytest
 from rig.experiment.errors import LimitError
 from rig.experiment.plan import make_plan
 from rig.spec.workspace import Workspace
+from tests.benches import BEAM_ACTUATOR
 
 from .conftest import ROOT, SHORT, make_request
 
@@ -22,7 +23,7 @@ def changed(section: str, **fields: Any) -> dict[str, Any]:
 
 
 def test_the_default_plan_is_that_of_the_paper() -> None:
-    setup = Workspace(ROOT).setup(ROOT / "tests/specs/bellow-bending.yaml", "virtual-beam")
+    setup = Workspace(ROOT).setup(BEAM_ACTUATOR, "virtual-beam")
     plan = make_plan(setup.protocol, setup.actuator, setup.bench)
     up = [k for k in plan.keys if k.direction == "up"]
     assert {k.target_kpa for k in up} == {float(p) for p in range(11)}
