@@ -10,7 +10,7 @@ from .conftest import Command
 
 def test_the_virtual_bench_is_ready(rig: Command, tmp_path: Path) -> None:
     report = tmp_path / "doctor.json"
-    outcome = rig("doctor", "--json", report)
+    outcome = rig("doctor", "--bench", "virtual-beam", "--json", report)
     assert outcome.code == 0
     assert "The bench is ready." in outcome.out
     told = json.loads(report.read_text(encoding="utf-8"))
