@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -110,7 +111,10 @@ def predict(
             _write_view(view, spec, material, float(grid[-1]), job)
         margins = []
         if FINITE_ELEMENTS in models:
-            margins = _margins(spec, material, float(grid[-1]), job)
+            margins = [
+                *_margins(spec, material, float(grid[-1]), job),
+                *_flank_gaps(spec, material, float(grid[-1]), job),
+            ]
     _show(spec.name, material.name, table)
     for line in margins:
         typer.echo(line)
@@ -246,6 +250,34 @@ def _margins(spec: ActuatorSpec, material: MaterialSpec, top: float, job: Job) -
         f"{governing.factor_high:.2g}, {governing.bulk_factor:.2g} for 99.5 % of the volume, of "
         f"{governing.criterion}."
     ]
+
+
+def _flank_gaps(spec: ActuatorSpec, material: MaterialSpec, top: float, job: Job) -> Iterator[str]:
+    """How close flanks come up to the highest pressure, where the model watches them."""
+    import numpy as np
+
+    from rig.mechanics.simulate.prediction import blocked_inflation, free_inflation
+
+    for question in (free_inflation(spec, material), blocked_inflation(spec, material)):
+        if question is None:
+            continue
+        curves = question.curves(top, job)
+        if "flank_gap" not in curves.measured:
+            continue
+        gaps, name = curves.measured["flank_gap"], question.name.capitalize()
+        least = int(np.argmin(gaps))
+        pressure = f"{curves.pressure[least] / 1e3:.4g} kPa"
+        if not np.isfinite(gaps[least]):
+            yield f"{name}: flanks stay far apart."
+        elif gaps[least] > 0:
+            yield f"{name}: flanks come as close as {1e3 * gaps[least]:.2g} mm, at {pressure}."
+        else:
+            first = curves.pressure[int(np.argmax(gaps <= 0))] / 1e3
+            yield (
+                f"Warning: {name.lower()}, flanks touch at {first:.4g} kPa and overlap by up to "
+                f"{-1e3 * gaps[least]:.2g} mm, at {pressure}. The model lets them pass through "
+                "each other: take results from there on as those of an actuator that is too soft."
+            )
 
 
 def _write_fields(

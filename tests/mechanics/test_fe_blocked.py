@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -68,6 +68,25 @@ def test_the_tip_stays_on_the_stop_and_slides_and_turns_there(found):
     assert np.all(np.diff(found.measured("angle")) > np.deg2rad(1))
     # only the edge touches: the underside behind it is free
     assert np.all(found.measured("clearance")[1:] > 0)
+
+
+def test_flanks_that_are_pushed_together_are_closer(found):
+    bending, solution = found.actuator.bending, found.result.solutions[0]
+    d, shape = bending.model.discretisation, bending.shape
+    between = 2 * (shape.trough_arc - shape.wall)
+    at_rest = np.zeros(d.size)
+    for share in (0.0, 0.3, 0.6):
+        x = at_rest.copy()
+        x[: d.displacement_size : 3] = -share * d.nodes[:, 0]
+        state = replace(solution.state, x=x)
+        gap = found.actuator.measures(replace(solution, state=state))["flank_gap"]
+        left = 1 - share
+        # round the root, now half an ellipse, chords between normals 30 degrees apart are shorter
+        chord = np.cos(np.arctan(np.tan(np.pi / 12) / left))
+        assert 0.98 * chord * left * between < gap <= left * between * (1 + 1e-6)
+    x = at_rest.copy()
+    x[: d.displacement_size : 3] = d.nodes[:, 0]
+    assert bending.flanks.gap(replace(solution.state, x=x)) == np.inf
 
 
 def test_the_hanging_weight_presses_on_the_stop_and_hardly_changes_what_pressure_adds(

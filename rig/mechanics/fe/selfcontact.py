@@ -5,8 +5,8 @@ where they are now, curved as they are, at the points of a lattice; two samples 
 where their outward normals are opposed within 30 degrees and the line between them follows both
 within 30 degrees: round the root of a fold the gap may be 3 % smaller than between its flanks.
 Facets that share a corner are not looked at: in a fold they always meet. The closest pairs of
-facets are sampled again, five times as finely. Parts that have passed through each other by less
-than `depth` have a negative gap.
+facets are sampled again, at 17 points a direction instead of two. Parts that have passed through
+each other by less than `depth` have a negative gap.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import skfem
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from rig.mechanics.fe.discretisation import Discretisation, Integers
+from rig.mechanics.fe.facets import Facets
 
 Array = NDArray[np.float64]
 
-_COARSE, _FINE = 4, 17
+_COARSE, _FINE = 2, 17
 """Samples along a direction of a facet, first and second time."""
 _NARROWER = 4
 """Times the reach is halved for the first look."""
@@ -55,16 +55,21 @@ class FacingSurface:
         through each other and still count as such: less than the thinnest wall, whose other face
         is opposed as well.
         """
-        self._d = discretisation
         self._facets = np.asarray(facets, dtype=np.int64)
         self._reach = reach
         self._depth = depth
-        self._samples = _Samples(discretisation, self._facets, _COARSE)
+        self._surfaces = Facets.of(discretisation, self._facets)
+        shape = (discretisation.dim, self._surfaces.triangular)
+        # off the edges, which neighbours share
+        self._coarse = _lattice(*shape, (np.arange(_COARSE) + 0.5) / _COARSE)
+        self._fine = _lattice(*shape, np.linspace(0.0, 1.0, _FINE))
         self._corners = discretisation.mesh.facets[:, self._facets].T
 
     def smallest_gap(self, x: Array) -> Gap | None:
         """The closest facing points for the displacements in x; None if all are out of reach."""
-        places, normals, number = self._samples.at(x)
+        places, normals = self._surfaces.at(x, self._coarse)
+        number = np.repeat(np.arange(len(places)), places.shape[1])
+        places, normals = (a.reshape(-1, a.shape[-1]) for a in (places, normals))
         tree = cKDTree(places)
         # most pairs are far apart: look near first, but as far as parts may have passed through
         nearer = self._reach / 2.0 ** np.arange(_NARROWER, 0, -1)
@@ -95,17 +100,22 @@ class FacingSurface:
         return best
 
     def _closer(self, x: Array, first: int, second: int) -> Gap | None:
-        facets = self._facets[[first, second]]
-        places, normals, number = _Samples(self._d, facets, _FINE).at(x)
-        here, there = np.flatnonzero(number == 0), np.flatnonzero(number == 1)
-        near = cKDTree(places[there]).query(places[here])[1]
-        pairs = np.stack((here, there[near]), axis=1)
+        at, directions = self._surfaces.part(np.array([first, second])).at(x, self._fine)
+        places, normals = np.concatenate(at), np.concatenate(directions)
+        count = len(self._fine)
+        here = np.arange(count)
+        near = cKDTree(at[1]).query(at[0])[1]
+        pairs = np.stack((here, count + near), axis=1)
         distance, faces = self._facing(places, normals, pairs)
         if not faces.any():
             return None
         k = int(np.flatnonzero(faces)[np.argmin(distance[faces])])
         a, b = pairs[k]
-        return Gap(float(distance[k]), (places[a], places[b]), (int(facets[0]), int(facets[1])))
+        return Gap(
+            float(distance[k]),
+            (places[a], places[b]),
+            (int(self._facets[first]), int(self._facets[second])),
+        )
 
     def _facing(
         self, places: Array, normals: Array, pairs: Integers
@@ -122,40 +132,8 @@ class FacingSurface:
         return np.where(inside, -length, length), opposed & (outside | inside)
 
 
-class _Samples:
-    def __init__(self, d: Discretisation, facets: Integers, count: int) -> None:
-        side = np.linspace(0.0, 1.0, count)
-        lattice = np.stack(np.meshgrid(*[side] * (d.dim - 1), indexing="ij")).reshape(d.dim - 1, -1)
-        if isinstance(d.mesh, skfem.MeshTet1):
-            lattice = lattice[:, lattice.sum(axis=0) <= 1 + 1e-12]
-        weights = np.ones(lattice.shape[1])
-        basis = skfem.FacetBasis(
-            d.mesh, d.element, facets=facets, quadrature=(lattice, weights), disable_doflocs=True
-        )
-        shape = basis.dx.shape
-        self._values = np.stack(
-            [np.broadcast_to(np.asarray(b[0]), shape) for b in basis.basis], axis=-1
-        )
-        self._slopes = np.stack([np.moveaxis(b[0].grad, 0, 2) for b in basis.basis], axis=-1)
-        self._nodes = basis.element_dofs.T.astype(np.int64)
-        self._normals = np.moveaxis(np.asarray(basis.normals), 0, -1)
-        self._rest = d.nodes
-        self._dim = d.dim
-
-    def at(self, x: Array) -> tuple[Array, Array, Integers]:
-        """Places and outward unit normals (n, dim) for displacements, and each one's facet."""
-        u = x[: self._rest.size].reshape(self._rest.shape)
-        places = self._values @ (self._rest + u)[self._nodes]
-        gradient = np.eye(self._dim) + np.einsum(
-            "fai,fqja->fqij", u[self._nodes], self._slopes, optimize=True
-        )
-        # Nanson: n da = cof F N dA
-        normals = np.linalg.solve(gradient.swapaxes(-1, -2), self._normals[..., None])[..., 0]
-        normals *= np.sign(np.linalg.det(gradient))[..., None]
-        normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-        number = np.repeat(np.arange(len(places)), places.shape[1])
-        return (
-            places.reshape(-1, self._dim),
-            normals.reshape(-1, self._dim),
-            number,
-        )
+def _lattice(dim: int, triangular: bool, side: Array) -> Array:
+    """Points of a facet, (n, dim - 1)."""
+    lattice = np.stack(np.meshgrid(*[side] * (dim - 1), indexing="ij"), axis=-1)
+    points = lattice.reshape(-1, dim - 1)
+    return points[points.sum(axis=1) <= 1 + 1e-12] if triangular else points

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,7 @@ from rig.mechanics.mesh.bellow_bending import (
 )
 from rig.mechanics.mesh.bellow_tetrahedra import TetrahedralBellowMesh
 from rig.mechanics.simulate.energies import mixed_energies
+from rig.mechanics.simulate.flanks import Flanks
 from rig.spec.actuator import BellowBendingGeometry
 from rig.spec.material import MaterialSpec
 
@@ -93,12 +95,18 @@ class BendingModel:
         """Volume of the whole cavity in m3."""
         return 2 * solution.volume
 
+    @cached_property
+    def flanks(self) -> Flanks:
+        """What watches the folds of outside and cavity."""
+        return Flanks(self.model.discretisation, self.shape)
+
     def measures(self, solution: Solution) -> dict[str, float]:
-        """Angle, displacement and volume, as `Response` has them."""
+        """Angle, displacement and volume, as `Response` has them; the gap between flanks in m."""
         return {
             "angle": self.angle(solution.state),
             "displacement": self.displacement(solution.state),
             "volume": self.volume(solution),
+            "flank_gap": self.flanks.gap(solution.state),
         }
 
 

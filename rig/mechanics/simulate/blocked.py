@@ -52,14 +52,15 @@ class BlockedBendingModel:
 
     def measures(self, solution: Solution) -> dict[str, float]:
         """Force of the whole actuator on the stop in N, the hanging weight's included; what the
-        cap turns in rad while its edge rests there; volume of the cavity in m3; and the least
-        height of the soft underside over the stop's disc in m: where it is not positive, the force
-        of an edge alone is too small."""
+        cap turns in rad while its edge rests there; volume of the cavity in m3; the gap between
+        flanks in m; and the least height of the soft underside over the stop's disc in m: where it
+        is not positive, the force of an edge alone is too small."""
         state = solution.state
         return {
             "force": 2 * self.stop.force(state.x),
             "angle": self.bending.angle(state),
             "volume": self.bending.volume(solution),
+            "flank_gap": self.bending.flanks.gap(state),
             "clearance": _clearance(self.bending, state.x),
         }
 
