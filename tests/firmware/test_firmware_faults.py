@@ -309,6 +309,22 @@ def test_a_stalled_motor_is_found_when_it_should_be_home() -> None:
     assert board.bench.valve_open
 
 
+def test_a_failed_return_makes_home_unknown_and_asks_for_a_new_search() -> None:
+    board = Board().at(5.0)
+    board.bench.home_switch_broken = 1
+    assert board.command("vent") == "accepted"
+    board.until("fault", 20_000)
+    assert board.fault == "homing_failed"
+    assert not board.last("HEARTBEAT")["homed"]
+    board.bench.home_switch_broken = 0
+    assert board.command("clear_fault") == "accepted"
+    assert board.command("set_pressure", 2.0) == "not_homed"
+    assert board.command("home") == "accepted"
+    board.until("idle", 60_000)
+    assert board.last("HEARTBEAT")["homed"]
+    assert board.bench.plunger_ml == pytest.approx(0.0, abs=2e-3)
+
+
 def test_a_motor_that_stalls_under_regulation_cannot_run_on() -> None:
     board = Board().at(5.0)
     board.bench.motor_stalled = 1

@@ -25,15 +25,6 @@ void PressureMonitor::configure(const Parameters &parameters) {
   stuck_volume_ = parameters.system_volume() * (kVisible / parameters.ambient_pressure());
 }
 
-void PressureMonitor::reset() {
-  open_.reset();
-  short_.reset();
-  over_.reset();
-  fast_.reset();
-  frozen_ticks_ = 0;
-  settling_ticks_ = kValveSettlingTicks;
-}
-
 Finding PressureMonitor::tick(const Transducer &transducer, const PressureScene &scene) {
   const Finding rail = rails(transducer, scene.converted);
   if (rail.fault != Fault::kNone) return rail;

@@ -20,7 +20,6 @@ struct PressureScene {
 class PressureMonitor {
  public:
   void configure(const Parameters &parameters);
-  void reset();
 
   Finding tick(const Transducer &transducer, const PressureScene &scene);
 

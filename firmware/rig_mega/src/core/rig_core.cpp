@@ -45,7 +45,6 @@ bool every(Counter period, Counter &counter) {
 RigCore::RigCore(const BoardInfo &board, const uint8_t *nonvolatile_image) : board_(board) {
   boot_finding_ = boot_finding(board.reset_cause, parameters_.load(nonvolatile_image));
   configure();
-  pressure_monitor_.reset();
   outputs_ = {kNoSteps, false, true, true};
 }
 
@@ -310,7 +309,6 @@ CommandResult RigCore::clear_fault() {
   const bool cause_stands = inputs_.emergency_stop || !pressure_monitor_.plausible() ||
                             transducer_.pressure() > parameters_.pressure_limit();
   if (cause_stands) return CommandResult::kFaulted;
-  pressure_monitor_.reset();
   load_cell_.forgive();
   safety_.clear();
   enter(State::kIdle);
