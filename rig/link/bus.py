@@ -104,7 +104,11 @@ class SlcanBus:
     def poll(self, duration_s: float) -> list[RawFrame]:
         """Let bench time pass; return the frames received, oldest first."""
         data = self._transport.read(duration_s)
-        return self._parser.feed(data, self._transport.now_s)
+        frames = self._parser.feed(data, self._transport.now_s)
+        # a bell instead of frames: the board started after the channel was opened, or anew
+        if slcan.BELL in data and not frames:
+            self.reopen()
+        return frames
 
     def reopen(self) -> None:
         """Open the channel again; the board's time stamps may start anew."""

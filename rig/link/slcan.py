@@ -18,6 +18,8 @@ MOST_DAMAGED = 10
 """After so many such stamps in a row it is the board's clock that started anew."""
 OPEN_WITH_TIMESTAMPS = b"\rC\rS6\rZ1\rO\r"
 CLOSE = b"C\r"
+BELL = b"\a"
+"""The answer to a line that makes no sense, and to a frame while the channel is closed."""
 MAX_LINE = 64
 """No SLCAN line is longer; what follows without a carriage return is noise."""
 

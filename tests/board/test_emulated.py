@@ -217,6 +217,21 @@ def test_saved_parameters_outlive_a_restart_and_damage_is_noticed(setup: Setup) 
 
 
 @needs_packages
+def test_what_is_wrong_at_the_start_is_heard_though_the_opening_came_too_early(
+    setup: Setup,
+) -> None:
+    bench = VirtualBench(setup, 1)
+    assert isinstance(bench.board, EmulatedBoard)
+    bench.board.corrupt_parameters()
+    link = RigLink(bench.bus)
+    link.raise_faults(False)
+    heard = link.wait(0.2)
+    names = load_schema().choices("FAULT", "code")
+    codes = [names[int(m.values["code"])] for m in heard if m.name == "FAULT"]
+    assert codes == ["parameters_corrupt"]
+
+
+@needs_packages
 @pytest.mark.parametrize(("level", "fault"), [(True, "hx711_timeout"), (False, "hx711_timeout")])
 def test_a_held_data_line_of_the_load_cell_is_noticed(
     setup: Setup, level: bool, fault: str

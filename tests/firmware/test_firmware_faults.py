@@ -449,6 +449,27 @@ def test_boot_faults_are_found_in_the_stored_parameters() -> None:
     assert board.command("clear_fault") == "accepted"
 
 
+def test_a_host_that_opens_the_channel_hears_of_a_standing_fault_at_once() -> None:
+    board = Board(nonvolatile=bytes(lib.rig_host_nonvolatile_size()), opening=b"")
+    board.run(300)
+    assert board.messages == []
+    for again in (1, 2):
+        board.type(b"O\r")
+        board.run(4)
+        assert [m["code"] for m in board.all("FAULT")] == ["parameters_corrupt"] * again
+        board.run(900)
+        assert len(board.all("FAULT")) == again
+        board.type(b"C\r")
+
+
+def test_opening_the_channel_of_a_sound_board_reports_no_fault() -> None:
+    board = Board()
+    board.run(1500)
+    board.type(b"O\r")
+    board.run(1500)
+    assert board.all("FAULT") == []
+
+
 def test_a_converter_that_never_starts_is_found_after_boot() -> None:
     board = Board(conditions={"sensor": 4})
     board.run(300)

@@ -33,6 +33,12 @@ void HostLink::tick() {
   if (stamp_ms_ >= kStampPeriodMs) stamp_ms_ = static_cast<uint16_t>(stamp_ms_ - kStampPeriodMs);
 }
 
+bool HostLink::take_opened() {
+  const bool opened = opened_;
+  opened_ = false;
+  return opened;
+}
+
 bool HostLink::receive(uint8_t byte, CanFrame &frame) {
   switch (parser_.feed(byte, frame)) {
     case slcan::Kind::kNothing: return false;
@@ -40,7 +46,7 @@ bool HostLink::receive(uint8_t byte, CanFrame &frame) {
       count(counters_.bad_lines);
       reply("\a");
       return false;
-    case slcan::Kind::kOpen: open_ = true; break;
+    case slcan::Kind::kOpen: open_ = opened_ = true; break;
     case slcan::Kind::kClose: close(); break;
     case slcan::Kind::kTimestampsOff: stamped_ = false; break;
     case slcan::Kind::kTimestampsOn: stamped_ = true; break;

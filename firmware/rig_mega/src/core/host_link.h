@@ -31,6 +31,9 @@ class HostLink {
 
   void tick();
 
+  // True once after the channel was opened: somebody new listens.
+  bool take_opened();
+
   TransmitQueue &transmit_queue() { return transmit_; }
   const LinkCounters &counters() const { return counters_; }
 
@@ -49,6 +52,7 @@ class HostLink {
   LinkCounters counters_ = {};
   uint16_t stamp_ms_ = 0;
   bool open_ = false;
+  bool opened_ = false;  // and nobody took note yet
   bool stamped_ = false;
 };
 

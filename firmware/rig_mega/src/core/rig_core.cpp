@@ -359,6 +359,7 @@ void RigCore::report() {
   if (every(kPressureTicks, pressure_ticks_)) send_pressure();
   if (every(kHeartbeatTicks, heartbeat_ticks_)) send_heartbeat();
   if (every(kControllerTicks, controller_ticks_)) send_controller();
+  if (link_.take_opened()) fault_report_ticks_ = kSecondTicks - 1;  // due now
   if (safety_.fault() != Fault::kNone && every(kSecondTicks, fault_report_ticks_)) send_fault();
   if (!load_cell_.powered()) send_load_cell(LoadCellStatus::kRestarted);
   if (load_cell_.silent(parameters_.hx711_timeout()) &&
