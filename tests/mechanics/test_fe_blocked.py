@@ -63,7 +63,7 @@ def test_the_tip_stays_on_the_stop_and_slides_and_turns_there(found):
     bending = found.actuator.bending
     for solution in found.result.solutions[1:]:
         x, z = bending.tip(solution.state)
-        assert z == pytest.approx(bending.shape.underside, abs=3e-5)
+        assert z == pytest.approx(bending.shape.underside, abs=1e-6)
         assert abs(x - bending.shape.tip) > 1e-5
     assert np.all(np.diff(found.measured("angle")) > np.deg2rad(1))
     # only the edge touches: the underside behind it is free
@@ -99,13 +99,10 @@ def test_the_hanging_weight_presses_on_the_stop_and_hardly_changes_what_pressure
     assert hanging[1] - hanging[0] == pytest.approx(lying[1], rel=0.05)
 
 
-def test_a_stop_that_is_not_touched_exerts_no_force(short, agilus30):
+def test_the_sign_of_the_force_tells_that_the_tip_would_leave_the_stop(short, agilus30):
     lifting = held(short, agilus30, -300.0, acceleration=(0.0, 0.0, 0.0))
     assert lifting.result.failure is None
-    assert lifting.measured("force")[-1] == 0.0
-    bending = lifting.actuator.bending
-    _x, z = bending.tip(lifting.result.solutions[-1].state)
-    assert z > bending.shape.underside + 1e-5
+    assert lifting.measured("force")[-1] < -1e-3
 
 
 def test_the_gap_follows_the_edge_of_the_rigid_cap_at_any_pose(found):

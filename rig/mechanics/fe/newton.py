@@ -243,7 +243,9 @@ def _newton_direction(
     unknowns = n_q + (slope is not None)
     if not unknowns:
         return _Step(known + whole[:, 0], np.zeros(0), d_pressure, d_dead, target)
-    bodies = (directions.T @ (matrix @ whole)) if n_q else np.zeros((0, whole.shape[1]))
+    # where the matrix is symmetric its product with the directions is there already
+    coupling = coupled.T if model.symmetric else directions.T @ matrix
+    bodies = coupling @ whole if n_q else np.zeros((0, whole.shape[1]))
     system = np.zeros((unknowns, unknowns))
     right = np.zeros(unknowns)
     system[:n_q] = bodies[:, 1:]

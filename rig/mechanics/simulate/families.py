@@ -10,7 +10,7 @@ from typing import Any
 from rig.mechanics.fe import Options
 from rig.mechanics.mesh.bellow_bending import BendingResolution
 from rig.mechanics.simulate.axisymmetric import axisymmetric_model
-from rig.mechanics.simulate.bending import bending_model
+from rig.mechanics.simulate.bending import FREE_OPTIONS, bending_model
 from rig.mechanics.simulate.blocked import BLOCKED_OPTIONS, blocked_bending_model
 from rig.mechanics.simulate.inflation import ActuatorModel
 from rig.spec.material import MaterialSpec
@@ -27,8 +27,9 @@ class Meshing:
     """Tip free."""
     blocked: Build | None = None
     """Tip held by a stop, whose force is a measure; None where the family has no such thing."""
+    free_options: Options = field(default_factory=Options)
     blocked_options: Options = field(default_factory=Options)
-    """Newton's method for the latter."""
+    """Newton's method for either."""
 
 
 @dataclass(frozen=True)
@@ -42,15 +43,24 @@ class Family:
     family that no bench measures yet."""
 
 
+_BENDING = BendingResolution(wall=1)
+"""Half the time of two elements through the wall, for 0.24 % of the angle at 10 kPa (1 % at 2 kPa):
+docs/theory/finite-elements.md, "Refinement and speed"."""
 _COARSE_BENDING = BendingResolution(wall=1, crown=4)
 
 FAMILIES: dict[str, Family] = {
     "bellow-axisymmetric": Family(model=Meshing(axisymmetric_model)),
     "bellow-bending": Family(
-        model=Meshing(bending_model, blocked_bending_model, BLOCKED_OPTIONS),
+        model=Meshing(
+            partial(bending_model, resolution=_BENDING),
+            partial(blocked_bending_model, resolution=_BENDING),
+            FREE_OPTIONS,
+            BLOCKED_OPTIONS,
+        ),
         specimen=Meshing(
             partial(bending_model, resolution=_COARSE_BENDING),
             partial(blocked_bending_model, resolution=_COARSE_BENDING),
+            FREE_OPTIONS,
             BLOCKED_OPTIONS,
         ),
     ),

@@ -25,12 +25,13 @@ def free_inflation(
     `specimen` takes the mesh of virtual specimens.
     """
     geometry = actuator.geometry
-    build = _meshing(actuator, specimen).free
+    meshing = _meshing(actuator, specimen)
     return Inflation(
         "tip free",
-        lambda: build(geometry, material),
+        lambda: meshing.free(geometry, material),
         _key("free", actuator, material, specimen),
         actuator.limits.pressure,
+        meshing.free_options,
     )
 
 
