@@ -5,7 +5,7 @@
 
 namespace rig {
 
-inline void count(uint16_t &counter) {
+inline void increment(uint16_t &counter) {
   if (counter != 0xFFFF) ++counter;
 }
 

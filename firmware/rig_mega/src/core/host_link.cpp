@@ -43,7 +43,7 @@ bool HostLink::receive(uint8_t byte, CanFrame &frame) {
   switch (parser_.feed(byte, frame)) {
     case slcan::Kind::kNothing: return false;
     case slcan::Kind::kBad:
-      count(counters_.bad_lines);
+      increment(counters_.bad_lines);
       reply("\a");
       return false;
     case slcan::Kind::kOpen: open_ = opened_ = true; break;
@@ -66,15 +66,15 @@ bool HostLink::receive(uint8_t byte, CanFrame &frame) {
 bool HostLink::accept(const CanFrame &frame) {
   const uint8_t i = index_of(frame.id, kReceived);
   if (i == kReceivedIds) {
-    count(counters_.unknown);
+    increment(counters_.unknown);
     return false;
   }
   switch (checks_[i].judge(frame)) {
     case Reception::kFresh: return true;
-    case Reception::kCorrupt: count(counters_.corrupt); return false;
+    case Reception::kCorrupt: increment(counters_.corrupt); return false;
     case Reception::kRepeated: break;
   }
-  count(counters_.repeated);
+  increment(counters_.repeated);
   return false;
 }
 
@@ -86,7 +86,7 @@ void HostLink::send(CanFrame frame) {
   const uint8_t length = slcan::format(frame, stamped_, stamp_ms_, line);
   // the counter advances even if the line is full: the host sees the gap
   alive_[i] = static_cast<uint8_t>(alive_[i] + 1 < kAliveCount ? alive_[i] + 1 : 0);
-  if (!transmit_.push(line, length)) count(counters_.not_sent);
+  if (!transmit_.push(line, length)) increment(counters_.not_sent);
 }
 
 void HostLink::reply(const char *text) {

@@ -355,7 +355,7 @@ void RigCore::load_cell_word(uint32_t word) {
 }
 
 void RigCore::report() {
-  if (every(kSecondTicks, second_ticks_)) count(uptime_s_);
+  if (every(kSecondTicks, second_ticks_)) increment(uptime_s_);
   if (every(kPressureTicks, pressure_ticks_)) send_pressure();
   if (every(kHeartbeatTicks, heartbeat_ticks_)) send_heartbeat();
   if (every(kControllerTicks, controller_ticks_)) send_controller();
