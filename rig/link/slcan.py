@@ -16,7 +16,8 @@ EARLIEST_MS, LATEST_MS = -100, 5_000
 """A stamp that puts its frame further off than this is damaged: no checksum protects it."""
 MOST_DAMAGED = 10
 """After so many such stamps in a row it is the board's clock that started anew."""
-OPEN_WITH_TIMESTAMPS = b"\rC\rS6\rZ1\rO\r"
+OPEN_WITH_TIMESTAMPS = b"\rC\rS6\rZ1\rO\rZ1\r"
+"""Stamps are asked for again at the end: a board that is just starting may miss any beginning."""
 CLOSE = b"C\r"
 BELL = b"\a"
 """The answer to a line that makes no sense, and to a frame while the channel is closed."""

@@ -8,6 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rig.board._firmware import ffi, lib
 
+from rig.link.slcan import OPEN_WITH_TIMESTAMPS
+
 # rig::slcan::Kind
 BAD, OPEN, CLOSE, BIT_RATE, STAMPS_OFF, STAMPS_ON, VERSION, SERIAL, STATUS, FRAME, OTHER = range(
     1, 12
@@ -109,6 +111,21 @@ def test_nothing_is_sent_before_the_channel_is_open() -> None:
     board.type(b"O\r")
     board.run(200)
     assert board.all("PRESSURE")
+
+
+@pytest.mark.parametrize("missed", range(len(OPEN_WITH_TIMESTAMPS)))
+def test_a_board_that_missed_the_beginning_of_the_opening_is_silent_or_stamps(missed: int) -> None:
+    board = Board(opening=OPEN_WITH_TIMESTAMPS[missed:])
+    board.heartbeats_on = False
+    lib.rig_host_run(board.host, lib.rig_test_bench_step, board._bench, 200, 0)
+    count = lib.rig_host_pending(board.host)
+    buffer = ffi.new("uint8_t[]", count)
+    lib.rig_host_transmit(board.host, buffer, count)
+    frames = [x for x in bytes(ffi.buffer(buffer)).split(b"\r") if b"t" in x]
+    stamped = len(b"t110") + 1 + 2 * 8 + 4
+    assert {len(frame[frame.index(b"t") :]) for frame in frames} <= {stamped}
+    if missed < len(OPEN_WITH_TIMESTAMPS) - len(b"O\rZ1\r"):
+        assert frames
 
 
 def test_closing_the_channel_silences_the_board() -> None:
