@@ -15,11 +15,11 @@ class LeakMonitor {
  public:
   void start(Volume plunger, Pressure pressure) {
     plunger_ = plunger;
-    pressure_ = pressure;
+    risen_ = pressure + kSoundRise;
   }
 
   Finding tick(Volume plunger, Pressure pressure, Volume limit) {
-    if (plunger < plunger_ || pressure > pressure_ + kSoundRise) start(plunger, pressure);
+    if (plunger < plunger_ || pressure > risen_) start(plunger, pressure);
     const Volume pushed = plunger - plunger_;
     if (pushed > limit) return {Fault::kLeak, to_ml(pushed)};
     return kNoFinding;
@@ -27,7 +27,7 @@ class LeakMonitor {
 
  private:
   Volume plunger_ = {};
-  Pressure pressure_ = {};
+  Pressure risen_ = {};
 };
 
 }  // namespace rig

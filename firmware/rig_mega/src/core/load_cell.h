@@ -6,6 +6,7 @@
 
 #include "faults.h"
 #include "hx711.h"
+#include "parameters.h"
 #include "tare.h"
 #include "tick.h"
 #include "units.h"
@@ -14,6 +15,10 @@ namespace rig {
 
 class LoadCell {
  public:
+  void configure(const Parameters &parameters) {
+    timeout_ticks_ = ticks_of(parameters.hx711_timeout());
+  }
+
   LoadCellStatus accept(uint32_t word) {
     const bool credible = due();
     since_read_ticks_ = 0;
@@ -34,7 +39,7 @@ class LoadCell {
 
   // A load cell that never spoke is not there; one that falls silent is restarted, and if that does
   // not help, a fault.
-  Finding tick(Duration timeout) {
+  Finding tick() {
     powered_ = !restart_asked_;
     restart_asked_ = false;
     if (since_read_ticks_ < kFastestTicks) ++since_read_ticks_;
@@ -43,15 +48,15 @@ class LoadCell {
     }
     if (!connected_) return kNoFinding;
     ++silent_ticks_;
-    if (++quiet_ticks_ > (restarted_ ? kSettlingTicks : ticks_of(timeout) / 2)) restart();
-    if (!silent(timeout)) return kNoFinding;
+    if (++quiet_ticks_ > (restarted_ ? kSettlingTicks : timeout_ticks_ / 2)) restart();
+    if (!silent()) return kNoFinding;
     return {Fault::kHx711Timeout, to_seconds(duration_of(silent_ticks_))};
   }
 
   // False for the one tick in which the chip is switched off; it needs 60 us.
   bool powered() const { return powered_; }
 
-  bool silent(Duration timeout) const { return connected_ && silent_ticks_ > ticks_of(timeout); }
+  bool silent() const { return connected_ && silent_ticks_ > timeout_ticks_; }
 
   void begin_tare() { tare_.begin(); }
   bool tared() const { return tare_.done(); }
@@ -79,6 +84,7 @@ class LoadCell {
 
   Hx711 hx711_;
   Tare tare_;
+  uint32_t timeout_ticks_ = 0;
   uint32_t silent_ticks_ = 0;  // since the last word
   uint32_t quiet_ticks_ = 0;   // since the last word or restart
   uint16_t sample_ = 0;

@@ -17,9 +17,10 @@ void PlungerMotion::configure(const Parameters &parameters) {
   const Volume per_step = parameters.volume_per_step();
   if (per_step < per_step_ || per_step > per_step_) homed_ = false;
   per_step_ = per_step;
-  steps_per_ml_ = 1.0f / to_ml(per_step);
+  tick_steps_per_flow_ = to_seconds(kTick) / to_ml(per_step);
   travel_ = parameters.syringe_volume();
   acceleration_ = parameters.max_flow_acceleration();
+  change_ = acceleration_ * kTick;
   const Flow fastest = per_tick(per_step * kMaxStepsPerTick);
   max_flow_ = parameters.max_flow() < fastest ? parameters.max_flow() : fastest;
   const float time_to_stop = max_flow_.value / acceleration_.value;
@@ -99,9 +100,8 @@ Flow PlungerMotion::within_travel(Flow wanted) {
 
 StepSchedule PlungerMotion::tick() {
   const Flow goal = within_travel(wanted());
-  const Flow change = acceleration_ * kTick;
-  velocity_ += clamp(goal - velocity_, -change, change);
-  const float travel = to_ml(velocity_ * kTick) * steps_per_ml_;
+  velocity_ += clamp(goal - velocity_, -change_, change_);
+  const float travel = to_ml_s(velocity_) * tick_steps_per_flow_;
   if (!(travel < 0) && !(travel > 0)) return kNoSteps;
   const bool inward = travel > 0;
   const float phase = inward ? fraction_ : -fraction_;
@@ -111,7 +111,8 @@ StepSchedule PlungerMotion::tick() {
   steps_ += whole;
   update_position();
   if (whole == 0) return kNoSteps;
-  return schedule_steps(inward, phase, inward ? travel : -travel);
+  const uint16_t count = static_cast<uint16_t>(inward ? whole : -whole);
+  return schedule_steps(inward, count, phase, inward ? travel : -travel);
 }
 
 }  // namespace rig

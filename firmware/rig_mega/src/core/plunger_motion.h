@@ -61,11 +61,12 @@ class PlungerMotion {
   Volume position_ = {};
 
   Volume per_step_ = ml(1e-3f);
-  float steps_per_ml_ = 1e3f;
+  float tick_steps_per_flow_ = 2;  // steps in a tick at 1 mL/s
   Volume travel_ = {};
   Volume stopping_ = {};  // from full speed
   Flow max_flow_ = {};
   FlowAcceleration acceleration_ = {};
+  Flow change_ = {};      // of velocity in one tick, at most
 };
 
 }  // namespace rig

@@ -17,8 +17,8 @@ Flow flow_demand(const Parameters &parameters, const SetpointRamp &setpoint, Vol
   const Volume gas = parameters.system_volume() - plunger;
   if (gas < Volume{}) return {};
   const Pressure absolute = parameters.ambient_pressure() + setpoint.value();
-  const float compression = (setpoint.rate() * kTick) / absolute;
-  return per_tick(gas * (parameters.feed_forward() * compression));
+  const float compression_per_s = setpoint.rate().value / to_kpa(absolute);
+  return ml_s(to_ml(gas) * parameters.feed_forward() * compression_per_s);
 }
 
 }  // namespace

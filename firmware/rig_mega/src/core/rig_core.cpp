@@ -52,6 +52,8 @@ void RigCore::configure() {
   transducer_.configure(parameters_);
   pressure_monitor_.configure(parameters_);
   motion_.configure(parameters_);
+  load_cell_.configure(parameters_);
+  host_timeout_ticks_ = ticks_of(parameters_.communication_timeout());
 }
 
 // --- a tick ------------------------------------------------------------------------------------
@@ -88,7 +90,7 @@ void RigCore::watch(const Inputs &inputs) {
 Finding RigCore::find_fault(const Inputs &inputs) {
   const Finding pressure = pressure_monitor_.tick(
       transducer_, {inputs.adc_count != 0, !safety_.valve_open(), motion_.position()});
-  const Finding cell = load_cell_.tick(parameters_.hx711_timeout());
+  const Finding cell = load_cell_.tick();
   const Finding findings[] = {
       inputs.emergency_stop ? Finding{Fault::kEmergencyStop, 0.0f} : kNoFinding,
       watch_travel(inputs),
@@ -105,10 +107,10 @@ Finding RigCore::find_fault(const Inputs &inputs) {
 
 Finding RigCore::watch_travel(const Inputs &inputs) {
   const State state = safety_.state();
-  const bool pushing = motion_.velocity() > Flow{};
-  const bool lost = (state == State::kHold || state == State::kRun) && motion_.homed() &&
-                    motion_.position() > kFalseHome;
-  if ((inputs.end_switch && pushing) || false_home_(inputs.home_switch && lost)) {
+  const bool into_end = inputs.end_switch && motion_.velocity() > Flow{};
+  const bool lost = inputs.home_switch && (state == State::kHold || state == State::kRun) &&
+                    motion_.homed() && motion_.position() > kFalseHome;
+  if (into_end || false_home_(lost)) {
     return {Fault::kTravelLimit, to_ml(motion_.position())};
   }
   return kNoFinding;
@@ -126,9 +128,8 @@ Finding RigCore::watch_host() {
     host_silent_ticks_ = 0;
     return kNoFinding;
   }
-  const Duration silent = duration_of(++host_silent_ticks_);
-  if (silent <= parameters_.communication_timeout()) return kNoFinding;
-  return {Fault::kCommunicationLost, to_seconds(silent)};
+  if (++host_silent_ticks_ <= host_timeout_ticks_) return kNoFinding;
+  return {Fault::kCommunicationLost, to_seconds(duration_of(host_silent_ticks_))};
 }
 
 // Whatever the fault: the loop ends and the valve opens at once; the plunger stops and, if it can
@@ -362,8 +363,7 @@ void RigCore::report() {
   if (link_.take_opened()) fault_report_ticks_ = kSecondTicks - 1;  // due now
   if (safety_.fault() != Fault::kNone && every(kSecondTicks, fault_report_ticks_)) send_fault();
   if (!load_cell_.powered()) send_load_cell(LoadCellStatus::kRestarted);
-  if (load_cell_.silent(parameters_.hx711_timeout()) &&
-      every(kSecondTicks, timeout_report_ticks_)) {
+  if (load_cell_.silent() && every(kSecondTicks, timeout_report_ticks_)) {
     send_load_cell(LoadCellStatus::kTimeout);
   }
 }

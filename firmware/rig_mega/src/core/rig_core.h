@@ -124,6 +124,7 @@ class RigCore {
   Debounce<5> false_home_;
   Debounce<250> out_of_travel_;
   uint32_t host_silent_ticks_ = 0;
+  uint32_t host_timeout_ticks_ = 0;
   uint16_t jog_ticks_ = 0;
   bool retracting_ = false;  // after a fault
   bool save_asked_ = false;

@@ -11,24 +11,32 @@ class SetpointRamp {
   void start_from(Pressure value) {
     value_ = target_ = value;
     rate_ = {};
+    resting_ = true;
   }
-  void set_target(Pressure target) { target_ = target; }
+  void set_target(Pressure target) {
+    target_ = target;
+    resting_ = near_target();
+  }
 
   void tick(PressureRate limit) {
     const Pressure step = clamp(target_ - value_, -(limit * kTick), limit * kTick);
     rate_ = per_tick(step);
     value_ += step;
-    if (resting()) value_ = target_;
+    resting_ = near_target();
+    if (resting_) value_ = target_;
   }
 
   Pressure value() const { return value_; }
   PressureRate rate() const { return rate_; }
-  bool resting() const { return magnitude(target_ - value_) < kpa(1e-5f); }
+  bool resting() const { return resting_; }
 
  private:
+  bool near_target() const { return magnitude(target_ - value_) < kpa(1e-5f); }
+
   Pressure value_ = {};
   Pressure target_ = {};
   PressureRate rate_ = {};
+  bool resting_ = true;
 };
 
 }  // namespace rig

@@ -18,15 +18,16 @@ constexpr StepSchedule kNoSteps = {false, 0, 0, 0};
 constexpr uint16_t kIntervalScale = 256;
 
 // `phase` in (-1, 1) is the part of a step already travelled in the direction of motion (negative
-// after a reversal), `travel` the positive distance of this tick in steps; together at least one step.
-inline StepSchedule schedule_steps(bool inward, float phase, float travel) {
-  const float end = phase + travel;
-  const uint16_t count = static_cast<uint16_t>(end);
-  const float interval = static_cast<float>(kTimerTicksPerTick) / travel;
-  const float first = (1.0f - phase) * interval;
+// after a reversal), `travel` the positive distance of this tick in steps; `count`, of at least
+// one, is the whole steps in both together.
+inline StepSchedule schedule_steps(bool inward, uint16_t count, float phase, float travel) {
+  constexpr float kScaledTick = static_cast<float>(kTimerTicksPerTick) * kIntervalScale;
+  constexpr float kLongest = 65535.0f * kIntervalScale;
+  const float interval = kScaledTick / travel;
+  const uint32_t first = static_cast<uint32_t>((1.0f - phase) * interval);
   // rounding down keeps the last step inside its tick
-  const float scaled = (interval < 65535.0f ? interval : 65535.0f) * kIntervalScale;
-  return {inward, count, static_cast<uint16_t>(first), static_cast<uint32_t>(scaled)};
+  return {inward, count, static_cast<uint16_t>(first / kIntervalScale),
+          static_cast<uint32_t>(interval < kLongest ? interval : kLongest)};
 }
 
 // How many of the steps fall before `timer_ticks` after the start of the tick.

@@ -15,7 +15,9 @@ bool differ(Voltage a, Voltage b) { return a < b || a > b; }
 }  // namespace
 
 void Transducer::configure(const Parameters &parameters) {
+  constexpr float kPerTick = kTicksPerSecond / (kRateTicks - 1);
   gain_kpa_v_ = parameters.transducer_gain_kpa_v();
+  rate_gain_kpa_s_v_ = gain_kpa_v_ * kPerTick;
   const Voltage offset = parameters.transducer_offset();
   const Voltage reference = parameters.adc_reference();
   if (differ(offset, offset_) || differ(reference, reference_)) {
@@ -25,7 +27,7 @@ void Transducer::configure(const Parameters &parameters) {
   offset_ = offset;
   reference_ = reference;
   volts_per_count_ = to_volts(reference) / kAdcCounts;
-  pressure_ = pressure_of(filtered_);
+  find_zero();
 }
 
 void Transducer::sample(uint32_t sum, uint8_t count) {
@@ -49,9 +51,7 @@ void Transducer::sample(uint32_t sum, uint8_t count) {
 }
 
 PressureRate Transducer::rate() const {
-  constexpr float kShare = 1.0f / (kRateTicks - 1);
-  const Voltage change = filtered_ - history_[next_history_];
-  return per_tick(kpa(gain_kpa_v_ * kShare * to_volts(change)));
+  return kpa_s(rate_gain_kpa_s_v_ * to_volts(filtered_ - history_[next_history_]));
 }
 
 bool Transducer::zero(Voltage at_ambient, Pressure limit) {
@@ -59,7 +59,7 @@ bool Transducer::zero(Voltage at_ambient, Pressure limit) {
   if (magnitude(kpa(gain_kpa_v_ * to_volts(shift))) > limit) return false;
   shift_ = shift;
   zeroed_ = true;
-  pressure_ = pressure_of(filtered_);
+  find_zero();
   return true;
 }
 

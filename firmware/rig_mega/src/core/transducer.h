@@ -32,18 +32,24 @@ class Transducer {
   void doubt_zero() { zeroed_ = false; }
 
  private:
+  void find_zero() {
+    zero_ = kpa(gain_kpa_v_ * to_volts(offset_ + shift_));
+    pressure_ = pressure_of(filtered_);
+  }
   Pressure pressure_of(Voltage voltage) const {
-    return kpa(gain_kpa_v_ * to_volts(voltage - offset_ - shift_));
+    return kpa(gain_kpa_v_ * to_volts(voltage)) - zero_;
   }
 
   static constexpr uint8_t kFilterTicks = 4;
   static constexpr uint8_t kRateTicks = 8;
 
   float gain_kpa_v_ = 1;
+  float rate_gain_kpa_s_v_ = 1;  // of a change over the history
   Voltage reference_ = {};
   float volts_per_count_ = 0;
   Voltage offset_ = {};
   Voltage shift_ = {};
+  Pressure zero_ = {};  // what offset and shift amount to
   Voltage tick_ = {};
   Voltage filtered_ = {};
   Pressure pressure_ = {};
