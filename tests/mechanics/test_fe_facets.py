@@ -45,6 +45,8 @@ def test_shapes_reproduce_quadratic_fields_and_their_slopes(name: str) -> None:
     values, slopes = facets.shapes(s)
     # places of nodes are linear in s on these straight facets, so their squares are quadratic
     at = values @ facets.places
+    corners = facets.places[:, list(facets.outline)]
+    np.testing.assert_allclose(facets.hats(s) @ corners, at, atol=1e-13)
     np.testing.assert_allclose(values @ facets.places**2, at**2, atol=1e-13)
     tangents = np.einsum("qak,fai->fqik", slopes, facets.places**2)
     linear = np.einsum("qak,fai->fqik", slopes, facets.places)

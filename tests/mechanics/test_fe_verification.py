@@ -26,6 +26,8 @@ from rig.mechanics.fe import (
     follow,
     traction,
 )
+from rig.mechanics.fe.contact import settle
+from rig.mechanics.fe.tie import Tie
 from rig.mechanics.hyperelastic import MooneyRivlin, NeoHookean, QuadraticVolume
 from tests.mechanics.fe_problems import curved_triangles, meshes, ring
 
@@ -115,6 +117,54 @@ def _pressure_of_cylinder(n: int, family: str) -> float:
     supports = [Support.of(d, d.nodes_at(x=0.0), (0,)), Support.of(d, d.nodes_at(y=0.0), (1,))]
     corner = 2 * int(d.nodes_at(x=INNER, y=0.0)[0])
     return _inflated(d, supports, corner, CYLINDER["bore"]).pressure
+
+
+@cache
+def _pressure_of_tied_cylinder(n: int) -> float:
+    """The cylinder of two parts that are tied at radius 15, the outer one half as fine again."""
+    parts = [
+        skfem.MeshQuad.init_tensor(
+            np.linspace(low, low + 5.0, n // 2 + 1), np.linspace(0.0, np.pi / 2, around + 1)
+        )
+        for low, around in ((INNER, 2 * n), (15.0, 3 * n))
+    ]
+    count = parts[0].nvertices
+    straight = skfem.MeshQuad(
+        np.hstack([part.p for part in parts]), np.hstack((parts[0].t, parts[1].t + count))
+    )
+    curved = skfem.MeshQuad2.from_mesh(straight)
+    radius, angle = curved.doflocs
+    places = np.stack((radius * np.cos(angle), radius * np.sin(angle)))
+    places[np.abs(places) < 1e-14] = 0.0
+    facets = straight.boundary_facets()
+    at = straight.p[0][straight.facets[:, facets]]
+    bore = facets[(at == INNER).all(axis=0)]
+    joint = facets[(at == 15.0).all(axis=0)]
+    outer = straight.f2t[0, joint] >= parts[0].nelements
+    mesh = skfem.MeshQuad2(places, curved.t).with_boundaries({"bore": bore})
+    d = discretise(mesh, Kinematics.PLANE_STRAIN)
+    tie = Tie(d, joint[outer], joint[~outer], penalty=100.0, tolerance=1e-8)
+    supports = [Support.of(d, d.nodes_at(x=0.0), (0,)), Support.of(d, d.nodes_at(y=0.0), (1,))]
+    corner = 2 * int(d.nodes_at(x=INNER, y=0.0)[0])
+    model = Model(
+        d,
+        [Solid(d, RUBBER, QuadraticVolume(BULK))],
+        supports=supports,
+        surface=PressureSurface(d, d.facets_on("bore")),
+        items=[tie],
+    )
+    control = DisplacementControl((corner,))
+    result = settle(model, [Point(CYLINDER["bore"] - INNER)], [tie], control, options=SHARP)
+    assert result.failure is None, result.failure
+    return result.solutions[0].pressure
+
+
+def test_a_cylinder_of_tied_parts_inflates_as_the_closed_form_says() -> None:
+    reference = _closed_form(CYLINDER["bore"], 2)
+    errors = [abs(_pressure_of_tied_cylinder(n) / reference - 1) for n in (2, 4, 8)]
+    assert errors[-1] < 1e-4
+    assert errors[1] < errors[0] / 4
+    assert errors[2] < errors[1] / 4
 
 
 @cache
@@ -274,6 +324,10 @@ def _figures() -> dict[str, tuple[float, float, float | None]]:
             coarse, fine = (solve(n, family) for n in (4, 8))
             order = np.log2(abs(coarse - reference) / abs(fine - reference))
             found[f"thick {body}, {family}, MPa"] = (reference, fine, float(order))
+    reference = _closed_form(CYLINDER["bore"], 2)
+    coarse, fine = (_pressure_of_tied_cylinder(n) for n in (4, 8))
+    order = np.log2(abs(coarse - reference) / abs(fine - reference))
+    found["thick cylinder of two tied parts, quads, MPa"] = (reference, fine, float(order))
     for family, other in (("quads", "triangles"), ("triangles", "quads")):
         steps = np.diff([_cook(n, family) for n in (4, 8, 16)])
         order = float(np.log2(steps[0] / steps[1]))

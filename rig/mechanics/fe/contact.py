@@ -289,7 +289,7 @@ def settle(
         else:
             return replace(
                 reached,
-                failure=f"contact did not settle in {_ROUNDS} updates of its multipliers at "
+                failure=f"contact or ties did not settle in {_ROUNDS} updates of multipliers at "
                 f"{found.pressure / 1e3:.4g} kPa; a larger penalty settles faster.",
             )
         for item in augmented:

@@ -56,6 +56,13 @@ class Facets:
         """Dimensions of space."""
         return int(self.places.shape[2])
 
+    @property
+    def outline(self) -> tuple[int, ...]:
+        """Which of the nodes are corners, one after the other round the facet."""
+        if self.triangular:
+            return (0, 5, 2)
+        return (0, 2) if self.dim == 2 else (0, 6, 8, 2)
+
     def part(self, which: Integers) -> Facets:
         """Some of these facets."""
         return Facets(self.nodes[which], self.places[which], self.outward[which], self.triangular)
@@ -83,6 +90,16 @@ class Facets:
                 axis=-1,
             ),
         )
+
+    def hats(self, s: Array) -> Array:
+        """Linear shape functions of the corners in the order of `outline`, (..., corners)."""
+        if self.triangular:
+            return np.stack((1 - s.sum(axis=-1), s[..., 0], s[..., 1]), axis=-1)
+        a = s[..., 0]
+        if self.dim == 2:
+            return np.stack((1 - a, a), axis=-1)
+        b = s[..., 1]
+        return np.stack(((1 - a) * (1 - b), a * (1 - b), a * b, (1 - a) * b), axis=-1)
 
     def at(self, x: Array, s: Array) -> tuple[Array, Array]:
         """Places and outward unit normals (facets, n, dim) at the same s (n, dim - 1) of each."""
