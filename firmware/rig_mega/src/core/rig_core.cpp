@@ -88,19 +88,16 @@ void RigCore::watch(const Inputs &inputs) {
 
 // The most immediate danger first. Every monitor runs in every tick, so that none is out of date.
 Finding RigCore::find_fault(const Inputs &inputs) {
+  const Finding travel = watch_travel(inputs);
   const Finding pressure = pressure_monitor_.tick(
       transducer_, {inputs.adc_count != 0, !safety_.valve_open(), motion_.position()});
+  const Finding regulation = safety_.valve_open() ? kNoFinding : watch_regulation();
   const Finding cell = load_cell_.tick();
-  const Finding findings[] = {
-      inputs.emergency_stop ? Finding{Fault::kEmergencyStop, 0.0f} : kNoFinding,
-      watch_travel(inputs),
-      pressure,
-      safety_.valve_open() ? kNoFinding : watch_regulation(),
-      cell,
-      watch_host(),
-  };
-  for (const Finding &finding : findings) {
-    if (finding.fault != Fault::kNone) return finding;
+  const Finding host = watch_host();
+  if (inputs.emergency_stop) return {Fault::kEmergencyStop, 0.0f};
+  const Finding *const findings[] = {&travel, &pressure, &regulation, &cell, &host};
+  for (const Finding *finding : findings) {
+    if (finding->fault != Fault::kNone) return *finding;
   }
   return kNoFinding;
 }

@@ -42,8 +42,8 @@ void Transducer::sample(uint32_t sum, uint8_t count) {
   }
   recent_[next_recent_] = tick_;
   next_recent_ = static_cast<uint8_t>((next_recent_ + 1) % kFilterTicks);
-  Voltage sum_v = {};
-  for (const Voltage &v : recent_) sum_v += v;
+  Voltage sum_v = recent_[0];
+  for (uint8_t i = 1; i < kFilterTicks; ++i) sum_v += recent_[i];
   filtered_ = sum_v * (1.0f / kFilterTicks);
   pressure_ = pressure_of(filtered_);
   history_[next_history_] = filtered_;

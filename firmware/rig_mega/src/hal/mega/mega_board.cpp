@@ -67,10 +67,10 @@ void write_pins(const Outputs &outputs) {
   hx711_power(outputs.load_cell_powered);
 }
 
-void exchange_bytes() {
+void exchange_bytes(RigCore &rig) {
   uint8_t byte;
-  while (serial_read(byte)) core().receive(byte);
-  HostLink::TransmitQueue &queue = core().transmit_queue();
+  while (serial_read(byte)) rig.receive(byte);
+  HostLink::TransmitQueue &queue = rig.transmit_queue();
   while (!queue.empty() && serial_can_write()) serial_write(queue.pop());
 }
 
@@ -104,21 +104,22 @@ void begin() {
 
 // The tick first: the next one carries out what this one decides.
 void step() {
+  RigCore &rig = core();
   TickSample sample;
   if (tick_due(sample)) {
-    const uint16_t queued = core().transmit_queue().size();
-    core().tick(read_pins(sample));
+    const uint16_t queued = rig.transmit_queue().size();
+    rig.tick(read_pins(sample));
     // a message and a conversion in one tick would make it late; the chip waits
-    const bool reported = core().transmit_queue().size() != queued;
-    write_pins(core().outputs());
+    const bool reported = rig.transmit_queue().size() != queued;
+    write_pins(rig.outputs());
     wdt_reset();
-    if (!reported && core().outputs().load_cell_powered && hx711_ready()) {
-      core().load_cell_word(hx711_read());
+    if (!reported && rig.outputs().load_cell_powered && hx711_ready()) {
+      rig.load_cell_word(hx711_read());
     }
-    if (!store.writing() && core().take_save(store.image())) store.begin_write();
+    if (!store.writing() && rig.take_save(store.image())) store.begin_write();
     store.step();
   }
-  exchange_bytes();
+  exchange_bytes(rig);
   sleep_until_tick();
 }
 
