@@ -207,8 +207,8 @@ class Session {
     require(out.steps.count <= 48, "no more than 24 000 steps a second");
     require(out.motor_enabled || out.steps.count == 0, "no steps without current");
     if (out.steps.count > 0) {
-      const uint32_t last = out.steps.first +
-                            static_cast<uint32_t>(out.steps.count - 1) * out.steps.interval;
+      const uint32_t last =
+          out.steps.first + (out.steps.count - 1u) * out.steps.interval / rig::kIntervalScale;
       require(last <= rig::kTimerTicksPerTick, "steps lie inside their tick");
     }
     if (seen.emergency_stop && before != rig::State::kBoot) {
