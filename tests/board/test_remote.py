@@ -54,7 +54,7 @@ def running(work: Callable[[Callable[[], bool]], None]) -> Iterator[None]:
 
 @pytest.fixture
 def port() -> Iterator[str]:
-    server = PtyServer(virtual_board(Workspace(ROOT).setup("bellow-bending"), 1))
+    server = PtyServer(virtual_board(Workspace(ROOT).setup("bellow-bending", "virtual-beam"), 1))
     with running(server.serve):
         yield server.port
     server.close()
@@ -113,7 +113,7 @@ def test_a_port_is_not_shared(port: str) -> None:
 
 
 def test_the_host_works_through_a_can_adapter() -> None:
-    board = virtual_board(Workspace(ROOT).setup("bellow-bending"), 1)
+    board = virtual_board(Workspace(ROOT).setup("bellow-bending", "virtual-beam"), 1)
     board.write(slcan.OPEN_WITH_TIMESTAMPS)
     parser = SlcanParser()
 
