@@ -94,7 +94,7 @@ def test_a_shipped_spec_survives_json(path: Path) -> None:
         (ACTUATOR, "wall_thickness", "wal_thickness", "wall_t", "geometry.wal_thickness",
          "unknown key 'wal_thickness'; did you mean 'wall_thickness'?"),
         (ACTUATOR, "limits:", "limit:", "limits:", "limit", "did you mean 'limits'?"),
-        (ACTUATOR, "[beam]", "[beem]", "beam]", "predictions[0]", "did you mean 'beam'?"),
+        (ACTUATOR, "[beam, fe]", "[beem, fe]", "beam, fe]", "predictions[0]", "did you mean 'beam'?"),
         (ACTUATOR, "bellow-bending\n  eff", "bellow-bendig\n  eff", None,
          "geometry.family", "did you mean 'bellow-bending'?"),
         (ACTUATOR, "material: agilus30\n", "", "kind", "material", "required, but missing"),
