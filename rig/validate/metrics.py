@@ -55,8 +55,8 @@ class ComparisonErrors:
     @property
     def u_validation(self) -> Array:
         """Validation uncertainty u_val at each level, (n,): V&V 20 eq. (1-5-8)."""
-        squares = sum((u**2 for u in self.u_common.values()), self.u_random**2)
-        return np.asarray(np.sqrt(squares), dtype=np.float64)
+        parts = np.stack([self.u_random, *self.u_common.values()])
+        return np.asarray(np.hypot.reduce(parts, axis=0), dtype=np.float64)
 
     def propagate(self, value: float, sensitivity: Array) -> Estimate:
         """Estimate of a result of the errors with sensitivity coefficients (n,)."""

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import stats
@@ -128,6 +128,7 @@ def test_bias_rmse_and_maximum_are_ordered(error: np.ndarray) -> None:
 
 
 @given(arrays(float, st.integers(1, 30), elements=FINITE), st.floats(0, 10), st.floats(0, 10))
+@example(np.array([1.0]), 0.0, 6.7e-280)  # its square is zero
 def test_rmse_is_never_more_uncertain_than_its_worst_level(
     error: np.ndarray, u: float, common: float
 ) -> None:
