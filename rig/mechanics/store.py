@@ -25,9 +25,8 @@ Entry = dict[str, NDArray[Any]]
 FOLDER_VARIABLE = "RIG_CACHE_DIR"
 SIZE_LIMIT = 2 << 30
 """Bytes that a store may take; the entries used longest ago go first."""
-
-
-_SOURCES = {".py", ".cpp", ".h"}
+SOURCES = {".py", ".cpp", ".h", ".inc"}
+"""Endings of the files that an answer may depend on."""
 
 
 class Store(Protocol):
@@ -137,7 +136,7 @@ def _code_version() -> str:
     """Hash of the mechanics' source."""
     package = Path(__file__).resolve().parent
     digest = hashlib.sha256()
-    for path in sorted(p for p in package.rglob("*") if p.suffix in _SOURCES):
+    for path in sorted(p for p in package.rglob("*") if p.suffix in SOURCES):
         digest.update(path.relative_to(package).as_posix().encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()

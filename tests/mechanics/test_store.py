@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -84,3 +85,13 @@ def test_a_remembering_store_answers_from_memory_and_fills_the_one_behind(tmp_pa
     assert remembering.load("new") is ENTRY
     assert remembering.load("other") is None
     assert Remembering(NoStore()).load("new") is None, "nothing is shared between two of them"
+
+
+def test_every_source_of_the_mechanics_counts_as_code() -> None:
+    package = Path(store.__file__).parent
+    shipped = subprocess.run(
+        ["git", "ls-files", "."], cwd=package, capture_output=True, text=True, check=False
+    ).stdout.split()
+    if not shipped:
+        pytest.skip("not in a checkout, which alone tells sources from what was built")
+    assert {Path(name).suffix for name in shipped} <= store.SOURCES
