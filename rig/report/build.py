@@ -88,7 +88,10 @@ def write_text(path: Path, text: str) -> None:
 def _predictions(data: RunData, job: Job) -> tuple[dict[str, Response], list[str]]:
     """The models' responses over the pressures of the run, and why some are missing."""
     actuator, material = data.setup.actuator, data.setup.material
-    pressures = np.linspace(0.0, _top(data), CURVE_POINTS)
+    top = _top(data)
+    targets = [1e3 * point.key.target_kpa for point in data.points]
+    # a model that ends between two points of a curve still answers at the pressure it ended at
+    pressures = np.union1d(np.linspace(0.0, top, CURVE_POINTS), np.minimum(targets, top))
     found: dict[str, Response] = {}
     notes: list[str] = []
     for model in actuator.predictions:

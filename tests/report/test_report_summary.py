@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from synthetic_run import SHORT, Story, library_setup, write_synthetic_run
 
 from rig.mechanics.model import predict
+from rig.mechanics.response import Response
 from rig.record.reader import RunReader
 from rig.report.analysis import build_summary
 from rig.report.build import analyse
@@ -256,3 +258,17 @@ def test_a_model_that_ended_early_is_compared_where_it_answers(run_folder: Path)
     assert [e.error for e in found.errors] == pytest.approx([e.error for e in same], abs=0.01)
     assert all(np.isfinite(e.u_validation) for e in found.errors)
     assert list(experiments["blocked_force"].models) == ["whole"]
+
+
+def test_a_model_that_ends_between_points_of_its_curve_still_answers_at_its_end(
+    run_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def ends_early(*asked: Any) -> Response:
+        whole = predict(*asked)
+        assert whole.angle is not None
+        return replace(whole, angle=np.where(whole.pressure > 2.5e3, np.nan, whole.angle))
+
+    monkeypatch.setattr("rig.report.build.predict", ends_early)
+    monkeypatch.setattr("rig.report.build.CURVE_POINTS", 4)
+    found = analyse(RunReader(run_folder)).summary.experiments["deformation"].models["beam"]
+    assert [e.pressure_kpa for e in found.errors] == [0, 2.5]
