@@ -4,9 +4,10 @@ The printed wall is meshed; the printed modulus needs no calculation of its own:
 s is the same as pressure and weight divided by s, with forces times s. Gravity offset, stiffening
 and the loss of blocked force come by themselves.
 
-Above the highest pressure that the finite elements reached, at least the actuator's limit where
-they converge, and below zero the tables continue straight: the virtual bench goes there in faults
-only.
+Above the highest rung that the finite elements reached and below zero the tables continue straight.
+With the tip free they reach the actuator's limit, so only faults lead beyond. Blocked they end
+where the first trough creases, for the default bellow between 8.8 and 10 kPa: from there to the
+limit the force of a virtual specimen is a continuation, not a solution.
 """
 
 from __future__ import annotations
