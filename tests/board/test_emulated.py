@@ -6,25 +6,21 @@ timers, pins, converter, UART, EEPROM, watchdog, and that the whole gives the sa
 
 from __future__ import annotations
 
-import threading
-import time
 from pathlib import Path
 
-import can
 import numpy as np
 import pytest
 
 from rig.board import emulator_build
 from rig.board.emulated import PARAMETERS_AT, PARAMETERS_SIZE, EmulatedBoard
 from rig.board.errors import BoardError
-from rig.board.pty import PtyServer
 from rig.board.virtual import VirtualBench, virtual_board
-from rig.link import e2e
 from rig.link.client import RigLink
 from rig.link.schema import load_schema
 from rig.plant.plant import Faults
 from rig.spec.workspace import Setup, Workspace
 from tests.benches import with_beam_specimen
+from tests.boards import seen_by_stock_slcan, served
 
 ROOT = Path(__file__).resolve().parents[2]
 OPENING = b"C\rS6\r\rO\rO\r"
@@ -293,26 +289,7 @@ def test_the_emulated_bench_is_the_virtual_one_with_another_board() -> None:
 
 @needs_packages
 def test_python_cans_slcan_talks_to_the_emulated_mega(setup: Setup) -> None:
-    server = PtyServer(virtual_board(setup, 1))
-    stop = threading.Event()
-    thread = threading.Thread(target=server.serve, args=(stop.is_set,))
-    thread.start()
-    try:
-        schema = load_schema()
-        bus = can.Bus(interface="slcan", channel=server.port, sleep_after_open=0.1)
-        names = []
-        end = time.monotonic() + 1.0
-        while time.monotonic() < end:
-            message = bus.recv(0.2)
-            if message is not None:
-                assert e2e.is_intact(message.arbitration_id, bytes(message.data))
-                decoded = schema.decode(message.arbitration_id, bytes(message.data))
-                assert decoded is not None
-                names.append(decoded[0])
-        bus.shutdown()
-    finally:
-        stop.set()
-        thread.join()
-        server.close()
+    with served(virtual_board(setup, 1)) as port:
+        names = seen_by_stock_slcan(port)
     assert names.count("PRESSURE") > 25
     assert names.count("HEARTBEAT") > 5

@@ -7,56 +7,32 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import can
 import pytest
 
-from rig.board.pty import PtyServer
 from rig.board.virtual import virtual_board
-from rig.link import e2e
 from rig.link.bus import PythonCanBus, SlcanBus
 from rig.link.client import RigLink
 from rig.link.errors import PortError
-from rig.link.schema import load_schema
 from rig.link.serial import SerialTransport
 from rig.spec.workspace import Workspace
+from tests.boards import seen_by_stock_slcan, served
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture
 def port() -> Iterator[str]:
-    server = PtyServer(virtual_board(Workspace(ROOT).setup("bellow-bending", "virtual-beam"), 1))
-    stop = threading.Event()
-    thread = threading.Thread(target=server.serve, args=(stop.is_set,))
-    thread.start()
-    try:
-        yield server.port
-    finally:
-        stop.set()
-        thread.join()
-        server.close()
+    setup = Workspace(ROOT).setup("bellow-bending", "virtual-beam")
+    with served(virtual_board(setup, 1)) as name:
+        yield name
 
 
 def test_python_cans_slcan_sees_live_frames(port: str) -> None:
-    schema = load_schema()
-    bus = can.Bus(interface="slcan", channel=port, sleep_after_open=0.1)
-    names = []
-    end = time.monotonic() + 1.0
-    try:
-        while time.monotonic() < end:
-            message = bus.recv(0.2)
-            if message is not None:
-                assert e2e.is_intact(message.arbitration_id, bytes(message.data))
-                decoded = schema.decode(message.arbitration_id, bytes(message.data))
-                assert decoded is not None
-                names.append(decoded[0])
-    finally:
-        bus.shutdown()
+    names = seen_by_stock_slcan(port)
     # 50 a second and 10 a second, less what opening and a busy machine cost
     assert names.count("PRESSURE") > 25
     assert names.count("HEARTBEAT") > 5

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import socket
-import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -17,7 +16,6 @@ import pytest
 import serial
 from serial.rfc2217 import PortManager
 
-from rig.board.pty import PtyServer
 from rig.board.virtual import virtual_board
 from rig.link import slcan
 from rig.link.client import RigLink
@@ -25,6 +23,7 @@ from rig.link.errors import PortError
 from rig.link.open import open_bus
 from rig.link.slcan import SlcanParser
 from rig.spec.workspace import Workspace
+from tests.boards import running, served
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -39,25 +38,11 @@ class PtyLine(serial.Serial):
     def _update_break_state(self) -> None: ...
 
 
-@contextlib.contextmanager
-def running(work: Callable[[Callable[[], bool]], None]) -> Iterator[None]:
-    """`work` in a thread of its own; it is handed what tells it to stop."""
-    stop = threading.Event()
-    thread = threading.Thread(target=work, args=(stop.is_set,))
-    thread.start()
-    try:
-        yield
-    finally:
-        stop.set()
-        thread.join()
-
-
 @pytest.fixture
 def port() -> Iterator[str]:
-    server = PtyServer(virtual_board(Workspace(ROOT).setup("bellow-bending", "virtual-beam"), 1))
-    with running(server.serve):
-        yield server.port
-    server.close()
+    setup = Workspace(ROOT).setup("bellow-bending", "virtual-beam")
+    with served(virtual_board(setup, 1)) as name:
+        yield name
 
 
 @pytest.fixture(params=["socket", "rfc2217"])

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import json
 import stat
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from rig.board.pty import PtyServer
 from rig.board.revision import firmware_revision
 from rig.board.virtual import virtual_board
 from rig.link.bus import SlcanBus
@@ -18,6 +16,7 @@ from rig.link.client import RigLink
 from rig.link.schema import load_schema
 from rig.link.serial import SerialTransport
 from rig.spec.workspace import Workspace
+from tests.boards import served
 
 from .conftest import ROOT, Command
 
@@ -27,19 +26,12 @@ RULES = load_schema().parameters
 @pytest.fixture
 def port(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     """A board on a pseudo-terminal; nothing resets it when the port is opened."""
-    server = PtyServer(virtual_board(Workspace(ROOT).setup("bellow-bending", "virtual-beam"), 1))
-    stop = threading.Event()
-    thread = threading.Thread(target=server.serve, args=(stop.is_set,))
-    thread.start()
     boots = SerialTransport.__init__.__kwdefaults__
     assert boots is not None
     monkeypatch.setitem(boots, "boot_s", 0.1)
-    try:
-        yield server.port
-    finally:
-        stop.set()
-        thread.join()
-        server.close()
+    setup = Workspace(ROOT).setup("bellow-bending", "virtual-beam")
+    with served(virtual_board(setup, 1)) as name:
+        yield name
 
 
 @pytest.fixture
