@@ -18,6 +18,8 @@ from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 
+import platformdirs
+
 from rig.board.errors import BoardError
 from rig.board.image import build_image
 from rig.board.revision import firmware_revision
@@ -73,8 +75,7 @@ def _kept_in() -> Path:
     root = library_root()
     if root.name != "_library":
         return root / "build" / "emulator"
-    cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(cache) / "rig" / "emulator"
+    return platformdirs.user_cache_path("rig") / "emulator"
 
 
 def _fingerprint(sources: Path) -> str:
