@@ -13,8 +13,9 @@ from typing import BinaryIO
 
 from mcap.writer import CompressionType, Writer
 
-from rig.plant.plant import GRAVITY, Truth
+from rig.plant.plant import Truth
 from rig.record.channels import LOG_FILE
+from rig.spec.quantity import STANDARD_GRAVITY
 
 SCHEMA = {
     "type": "object",
@@ -55,7 +56,7 @@ class TruthFile:
         row = (
             f'{{"time_s":{time_s:.3f},"pressure_kpa":{truth.gauge_pressure / 1e3:.6f},'
             f'"angle_deg":{math.degrees(truth.angle):.6f},'
-            f'"force_g":{truth.force / GRAVITY * 1e3:.6f},'
+            f'"force_g":{truth.force / STANDARD_GRAVITY * 1e3:.6f},'
             f'"volume_ml":{truth.actuator_volume * 1e6:.6f}}}'
         )
         self._writer.add_message(self._channel, stamp, row.encode(), stamp)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rig.mechanics.response import Array, Response
+from rig.spec.quantity import STANDARD_GRAVITY
 
 COLUMNS = (
     "model",
@@ -16,7 +17,7 @@ COLUMNS = (
     "max_von_mises_kpa",
 )
 
-GRAM_FORCE = 9.80665e-3
+GRAM_FORCE = 1e-3 * STANDARD_GRAVITY
 """Newtons in a gram-force."""
 
 

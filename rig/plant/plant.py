@@ -16,11 +16,11 @@ from rig.plant._plant import ffi, lib
 from rig.plant.specimen import Specimen
 from rig.spec.bench import BenchSpec
 from rig.spec.calibration import LoadCellCalibration, TransducerCalibration
+from rig.spec.quantity import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 AIR_VISCOSITY = 1.82e-5
 """Pa s at 20 degC (CRC Handbook of Chemistry and Physics)."""
-GRAVITY = 9.80665
 REFERENCE_LEAK_PRESSURE = 10e3
 """Gauge pressure in Pa at which a bench spec states its leak."""
 RESPONSE_TIME = 0.02
@@ -236,7 +236,9 @@ def plant_parameters(
     virtual = bench.virtual
     radius = bench.tubing.inner_diameter / 2
     tube_resistance = 8 * AIR_VISCOSITY * bench.tubing.length / (np.pi * radius**4)
-    counts_per_newton = load_cell.counts_per_gram * (1 + errors.counts_per_gram) / (1e-3 * GRAVITY)
+    counts_per_newton = (
+        load_cell.counts_per_gram * (1 + errors.counts_per_gram) / (1e-3 * STANDARD_GRAVITY)
+    )
     gain = transducer.gain * (1 + errors.transducer_gain)
     return {
         "ambient_pressure": bench.ambient.pressure,
@@ -264,7 +266,9 @@ def plant_parameters(
         "adc_levels": 2.0**bench.adc.bits,
         "counts_per_newton": counts_per_newton,
         "load_cell_zero_counts": errors.load_cell_zero_counts,
-        "load_cell_noise_counts": virtual.sensors.load_cell_noise * GRAVITY * counts_per_newton,
+        "load_cell_noise_counts": virtual.sensors.load_cell_noise
+        * STANDARD_GRAVITY
+        * counts_per_newton,
         "load_cell_creep_share": virtual.sensors.load_cell_creep,
         "load_cell_creep_time": virtual.sensors.load_cell_creep_time,
         "load_cell_period": 1 / bench.load_cell.sample_rate,

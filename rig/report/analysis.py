@@ -36,6 +36,7 @@ from rig.report.summary import (
 )
 from rig.spec.calibration import TransducerCalibration
 from rig.spec.published import PublishedReference
+from rig.spec.quantity import STANDARD_GRAVITY
 from rig.validate.metrics import (
     ComparisonErrors,
     Repeatability,
@@ -51,7 +52,6 @@ from rig.validate.metrics import (
 from rig.validate.uncertainty import Component, Estimate, combine
 
 Array = NDArray[np.float64]
-STANDARD_GRAVITY = 9.80665
 PRESSURE_NOISE_KPA = 0.03
 """A mean pressure may lie this far beyond where a model ends and still be compared with it."""
 QUANTITIES: dict[ExperimentName, str] = {

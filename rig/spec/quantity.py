@@ -21,6 +21,8 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 if TYPE_CHECKING:
     import pint
 
+STANDARD_GRAVITY = 9.80665
+"""m/s2; newtons in a kilogram-force."""
 MAX_CHARACTERS = 60
 
 # The grammar is checked before pint sees the text: pint evaluates arithmetic such as 2**9999999.

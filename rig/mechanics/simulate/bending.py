@@ -40,11 +40,10 @@ from rig.mechanics.simulate.energies import mixed_energies
 from rig.mechanics.simulate.flanks import Flanks
 from rig.spec.actuator import BellowBendingGeometry
 from rig.spec.material import MaterialSpec
+from rig.spec.quantity import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 
-STANDARD_GRAVITY = 9.80665
-"""m/s2."""
 HANGING = (STANDARD_GRAVITY, 0.0, 0.0)
 """Gravity of an actuator that hangs from its connector, m/s2: along x, towards the tip."""
 FREE_OPTIONS = Options(correction=2e-5)
