@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rig.mechanics.fe import Extremes, Kinematics, summarise
+from rig.mechanics.fe import Extremes, Kinematics
 from rig.mechanics.job import Job
 from rig.mechanics.simulate.prediction import free_inflation
 from rig.mechanics.strength import Criterion, safety
@@ -53,13 +53,12 @@ def strength_section(
 
     Raises MechanicsError where the family has no such model or it reached no pressure.
     """
-    found, solutions = free_inflation(actuator, material).solutions(top, job)
+    inflation = free_inflation(actuator, material)
+    found, solutions = inflation.solutions(top, job)
+    extremes = inflation.curves(top, job).extremes
     view: View | None = None
     if found.model.discretisation.kinematics is Kinematics.SOLID:
-        scene = scene_of(found.model, solutions, found.mirror)
-        view, extremes = view_of(scene), scene.extremes
-    else:
-        extremes = tuple(summarise(found.model, s) for s in solutions)
+        view = view_of(scene_of(found.model, solutions, extremes, found.mirror))
     ranges = [material.tensile_strength, material.elongation_at_break]
     return StrengthSection(
         view=view,

@@ -24,8 +24,7 @@ from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
 from rig.mechanics.fe import Extremes, Model, Peak, Solution
-from rig.mechanics.fe.extremes import extremes_of
-from rig.mechanics.fe.fields import all_point_fields, displacements, recovered
+from rig.mechanics.fe.fields import displacements, nodal_fields
 from rig.mechanics.fe.surface import Surface, surface_of
 
 Array = NDArray[np.float64]
@@ -82,27 +81,28 @@ class Scene:
         return low, np.maximum(self.positions.max(axis=(0, 1)) - low, 1e-9)
 
 
-def scene_of(model: Model, solutions: Sequence[Solution], mirror: int | None) -> Scene:
-    """What there is to see of a model, half of a body across the plane normal to axis `mirror`."""
+def scene_of(
+    model: Model,
+    solutions: Sequence[Solution],
+    extremes: Sequence[Extremes],
+    mirror: int | None,
+) -> Scene:
+    """What there is to see of a model, half of a body across the plane normal to axis `mirror`.
+
+    `extremes` are those of the solutions, in their order.
+    """
     surface = surface_of(model, mirror)
-    shown = _shown(solutions, len(surface.node))
+    steps = _shown(len(solutions), len(surface.node))
+    shown, peaks = [solutions[i] for i in steps], [extremes[i] for i in steps]
     d = model.discretisation
     rest = d.nodes[surface.node]
-    inside = [all_point_fields(model, s.state) for s in shown]
-    fields = [
-        [recovered(solid, at) for solid, at in zip(model.solids, step, strict=True)]
-        for step in inside
-    ]
-    extremes = [
-        extremes_of(model, solution.pressure, at_points, at_nodes)
-        for solution, at_points, at_nodes in zip(shown, inside, fields, strict=True)
-    ]
+    fields = [nodal_fields(model, s.state) for s in shown]
 
     def gathered(values: list[list[Array]]) -> Array:
         return np.stack([np.concatenate(v)[surface.entry] for v in values])
 
-    stress = [e.von_mises for e in extremes]
-    stretch = [e.principal_strain for e in extremes]
+    stress = [e.von_mises for e in peaks]
+    stretch = [e.principal_strain for e in peaks]
     return Scene(
         surface=surface,
         mirror=mirror,
@@ -126,7 +126,7 @@ def scene_of(model: Model, solutions: Sequence[Solution], mirror: int | None) ->
                 peaks=tuple(_words(1 + p.value, 1 + p.bulk, "", p) for p in stretch),
             ),
         ),
-        extremes=tuple(extremes),
+        extremes=tuple(peaks),
     )
 
 
@@ -139,10 +139,10 @@ def _words(value: float, bulk: float, unit: str, peak: Peak) -> str:
     )
 
 
-def _shown(solutions: Sequence[Solution], vertices: int) -> list[Solution]:
-    """So many steps as the budget allows, the first and the last among them."""
-    count = min(len(solutions), max(2, BUDGET // (8 * vertices)))
-    return [solutions[i] for i in np.linspace(0, len(solutions) - 1, count).round().astype(int)]
+def _shown(steps: int, vertices: int) -> list[int]:
+    """So many of the steps as the budget allows, the first and the last among them."""
+    count = min(steps, max(2, BUDGET // (8 * vertices)))
+    return [int(i) for i in np.linspace(0, steps - 1, count).round()]
 
 
 def _round(value: float) -> float:

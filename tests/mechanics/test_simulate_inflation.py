@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from rig.mechanics.fe import Model, Progress, Solution, rotation_vector
+from rig.mechanics.fe.extremes import PEAKS, summarise
 from rig.mechanics.job import Job
 from rig.mechanics.simulate.families import Family, Meshing
 from rig.mechanics.simulate.inflation import RUNGS, ActuatorModel, Inflation
@@ -130,3 +131,16 @@ def test_stored_equilibria_are_those_that_were_found(complete: Memory) -> None:
         np.testing.assert_allclose(
             found.residual[actuator.model.free], 0.0, atol=1e-5 * found.scale
         )
+
+
+def test_stored_extremes_are_those_of_the_equilibria(complete: Memory) -> None:
+    actuator, solutions = question().solutions(LIMIT / 4, Job(complete))
+    stored = question(never).curves(LIMIT / 4, Job(complete)).extremes
+    for solution, found in zip(solutions, stored, strict=True):
+        expected = summarise(actuator.model, solution)
+        assert found.pressure == expected.pressure
+        for name in PEAKS:
+            ours, theirs = getattr(found, name), getattr(expected, name)
+            assert (ours.value, ours.bulk) == (theirs.value, theirs.bulk)
+            assert (ours.solid, ours.at_notch) == (theirs.solid, theirs.at_notch)
+            np.testing.assert_array_equal(ours.place, theirs.place)

@@ -15,6 +15,7 @@ import pytest
 from html_page import Page
 
 from rig.mechanics.fe import (
+    Extremes,
     Kinematics,
     Model,
     Point,
@@ -59,8 +60,14 @@ def solved() -> tuple[Model, tuple[Solution, ...]]:
 
 
 @pytest.fixture(scope="module")
-def scene(solved: tuple[Model, tuple[Solution, ...]]) -> Scene:
-    return scene_of(*solved, mirror=1)
+def extremes(solved: tuple[Model, tuple[Solution, ...]]) -> list[Extremes]:
+    model, solutions = solved
+    return [summarise(model, solution) for solution in solutions]
+
+
+@pytest.fixture(scope="module")
+def scene(solved: tuple[Model, tuple[Solution, ...]], extremes: list[Extremes]) -> Scene:
+    return scene_of(*solved, extremes, mirror=1)
 
 
 @pytest.fixture(scope="module")
@@ -121,13 +128,16 @@ def test_colours_end_at_what_nearly_all_material_stays_below(scene: Scene) -> No
 
 
 def test_steps_are_left_out_evenly_where_there_is_no_room_for_all(
-    solved: tuple[Model, tuple[Solution, ...]], monkeypatch: pytest.MonkeyPatch
+    solved: tuple[Model, tuple[Solution, ...]],
+    extremes: list[Extremes],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     model, solutions = solved
     vertices = len(surface_of(model, 1).node)
     monkeypatch.setattr(view3d, "BUDGET", 8 * vertices * 2)
-    found = scene_of(model, solutions, mirror=1)
+    found = scene_of(model, solutions, extremes, mirror=1)
     np.testing.assert_allclose(found.pressures, [0.0, 2e3])
+    assert [e.pressure for e in found.extremes] == pytest.approx([0.0, 2e3])
 
 
 def test_the_view_turns_without_changing_lengths_or_hands() -> None:

@@ -7,7 +7,7 @@ it has a limit as the mesh is refined, notch or not, because the volume above a 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from rig.mechanics.fe.fields import (
     Fields,
-    NodalFields,
-    PointFields,
     all_point_fields,
     recovered,
 )
@@ -72,13 +70,6 @@ def summarise(model: Model, solution: Solution) -> Extremes:
     """Largest stresses and strains of a model at one of its solutions."""
     inside = all_point_fields(model, solution.state)
     outside = [recovered(s, at) for s, at in zip(model.solids, inside, strict=True)]
-    return extremes_of(model, solution.pressure, inside, outside)
-
-
-def extremes_of(
-    model: Model, pressure: float, inside: Sequence[PointFields], outside: Sequence[NodalFields]
-) -> Extremes:
-    """The same of fields that are known: per solid at quadrature points and at nodes."""
     nodes, near = model.discretisation.nodes, near_notches(model)
     volumes = np.concatenate([fields.weights.reshape(-1) for fields in inside])
 
@@ -97,7 +88,7 @@ def extremes_of(
         )
 
     return Extremes(
-        pressure=pressure,
+        pressure=solution.pressure,
         von_mises=peak(lambda fields: fields.von_mises),
         principal_stress=peak(lambda fields: fields.principal_stress[0]),
         nominal_stress=peak(lambda fields: fields.nominal_stress[0]),
