@@ -22,7 +22,8 @@ from rig.link.bus import SlcanBus
 from rig.mechanics.job import Job
 from rig.mechanics.profile import side_profile
 from rig.plant.camera import CameraFault, VirtualCamera
-from rig.plant.plant import Fixture, HiddenErrors, Plant, plant_parameters
+from rig.plant.instruments import Instruments
+from rig.plant.plant import Fixture, Plant, plant_parameters
 from rig.plant.specimen import Specimen, draw_specimen
 from rig.spec.bench import BenchSpec, EmulatedBoard
 from rig.spec.bench import VirtualBench as VirtualBenchSpec
@@ -81,21 +82,12 @@ def specimen_of(setup: Setup, seed: int, job: Job | None = None) -> Specimen:
 
 
 def _plant(setup: Setup, specimen: Specimen, seeds: _Seeds) -> Plant:
-    """The simulated bench around a specimen, with the instrument errors that the seeds draw."""
-    bench, calibrations = setup.bench, setup.calibrations
-    errors = HiddenErrors.draw(
-        bench,
-        calibrations.transducer,
-        calibrations.load_cell,
-        np.random.default_rng(seeds.instruments),
+    """The simulated bench around a specimen, with the instruments that the seeds draw."""
+    instruments = Instruments.draw(
+        setup.bench, _virtual(setup.bench), np.random.default_rng(seeds.instruments)
     )
     parameters = plant_parameters(
-        bench,
-        calibrations.transducer,
-        calibrations.load_cell,
-        specimen,
-        errors,
-        setup.actuator.limits.pressure,
+        setup.bench, specimen, instruments, setup.actuator.limits.pressure
     )
     return Plant(parameters, specimen, int(seeds.noise.generate_state(1, np.uint64)[0]))
 

@@ -1,35 +1,59 @@
-"""From readings to a point: means, standard deviations and combined standard uncertainty.
+"""From readings to a point: means, standard deviations and uncertainty budgets.
 
 Pure, and used alike while a run is taken and when it is replayed from its log, so that both give
 the same numbers. Uncertainty after the GUM (JCGM 100:2008, 4.2, 4.3, 5.1): type A from readings,
-type B from calibrations, combined by root sum of squares.
+type B from calibrations, combined by root sum of squares; the lines are those of
+`rig.validate.budget`.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig.record.documents import AngleReading, PointDocument, PointKey
-from rig.spec.calibration import LoadCellCalibration
+from rig.spec.calibration import CameraCalibration, LoadCellCalibration, TransducerCalibration
+from rig.validate.budget import force_components, pressure_components, readings, tare_component
+from rig.validate.uncertainty import Component, combine
 
 HAMPEL_LIMIT = 6.0
 """A load-cell reading this many robust standard deviations off the median is a bad word."""
+TARE_WORDS = 20
+"""Words that the firmware takes the mean of for its tare (rig::Tare::kWords)."""
 
 
 @dataclass(frozen=True)
 class Visit:
-    """When a point was visited, and the pressure while it was measured (kPa)."""
+    """When a point was visited, and the pressure that the board gave while it was measured (kPa).
+
+    The board knows the straight line of the `transducer` only.
+    """
 
     key: PointKey
     started_s: float
     settled_s: float | None
     measured_from_s: float
     measured_to_s: float
-    pressure_kpa: NDArray[np.float64]
+    indicated_kpa: NDArray[np.float64]
+    transducer: TransducerCalibration
+
+    @property
+    def pressure_kpa(self) -> float:
+        """Mean pressure, corrected as the transducer's calibration says."""
+        return self.transducer.corrected(float(self.indicated_kpa.mean()) * 1e3) / 1e3
+
+    @property
+    def pressure_components(self) -> tuple[Component, ...]:
+        """What makes `pressure_kpa` uncertain, in kPa."""
+        spread = _spread(self.indicated_kpa)
+        return (
+            readings(spread, len(self.indicated_kpa), "kPa"),
+            *pressure_components(self.transducer, self.pressure_kpa),
+        )
 
 
 @dataclass(frozen=True)
@@ -40,61 +64,64 @@ class CellReading:
     status: str
 
 
-def angle_point(visit: Visit, readings: Sequence[AngleReading]) -> PointDocument:
+def angle_point(
+    visit: Visit, frames: Sequence[AngleReading], camera: CameraCalibration
+) -> PointDocument:
     """The bending angle of a point in degrees from the vision results of its frames.
 
-    The uncertainty that vision states for a frame holds the camera's calibration and parts common
-    to all frames of a still scene (shading, edges), so it is not reduced by averaging.
+    What vision is unsure of in a frame is common to all frames of a still scene (ruler, shading,
+    edges), so it is not reduced by averaging; the lens is told apart from it.
     """
-    accepted = [r for r in readings if r.accepted and r.angle_deg is not None]
+    accepted = [r for r in frames if r.accepted and r.angle_deg is not None]
+    rejected = tuple(r.reason for r in frames if not r.accepted)
     angles = np.array([r.angle_deg for r in accepted], dtype=np.float64)
-    value, spread, u = None, 0.0, 0.0
-    if len(angles):
-        value = float(angles.mean())
-        spread = float(angles.std(ddof=1)) if len(angles) > 1 else 0.0
-        vision_u = float(np.mean([r.u_deg for r in accepted]))
-        u = float(np.sqrt(spread**2 / len(angles) + vision_u**2))
-    rejected = tuple(r.reason for r in readings if not r.accepted)
-    return _document(visit, "deg", value, spread, u, len(angles), rejected)
+    if len(angles) == 0:
+        return _document(visit, "deg", None, angles, (), rejected)
+    vision = float(np.mean([r.u_deg for r in accepted]))
+    lens = min(camera.angle_u_deg, vision)
+    parts = (
+        readings(_spread(angles), len(angles), "deg"),
+        Component("edges and ruler", math.sqrt(vision**2 - lens**2), unit="deg"),
+        Component("lens", lens, unit="deg"),
+    )
+    return _document(visit, "deg", float(angles.mean()), angles, parts, rejected)
 
 
 def force_point(
-    visit: Visit, readings: Sequence[CellReading], calibration: LoadCellCalibration
+    visit: Visit, words: Sequence[CellReading], calibration: LoadCellCalibration
 ) -> PointDocument:
     """The tip force of a point in grams-force from the load cell's conversions."""
-    rejected = [r.status for r in readings if r.status != "ok"]
-    counts = np.array([r.counts for r in readings if r.status == "ok"], dtype=np.float64)
-    if len(counts):
-        median = float(np.median(counts))
-        scale = 1.4826 * float(np.median(np.abs(counts - median)))
-        outlying = np.abs(counts - median) > HAMPEL_LIMIT * max(scale, 1.0)
-        rejected += ["outlier"] * int(outlying.sum())
-        counts = counts[~outlying]
-    value, spread, u = None, 0.0, 0.0
-    if len(counts):
-        grams = counts / calibration.counts_per_gram
-        value = float(grams.mean())
-        spread = float(grams.std(ddof=1)) if len(grams) > 1 else 0.0
-        u = float(
-            np.sqrt(
-                spread**2 / len(grams)
-                + (calibration.counts_per_gram_u * value) ** 2
-                + (calibration.creep_u * 1e3) ** 2
-            )
-        )
-    return _document(visit, "g", value, spread, u, len(counts), tuple(rejected))
+    rejected = [r.status for r in words if r.status != "ok"]
+    counts = np.array([r.counts for r in words if r.status == "ok"], dtype=np.float64)
+    if len(counts) == 0:
+        return _document(visit, "g", None, counts, (), tuple(rejected))
+    median = float(np.median(counts))
+    scale = 1.4826 * float(np.median(np.abs(counts - median)))
+    outlying = np.abs(counts - median) > HAMPEL_LIMIT * max(scale, 1.0)
+    rejected += ["outlier"] * int(outlying.sum())
+    grams = counts[~outlying] / calibration.counts_per_gram
+    value = calibration.corrected(float(grams.mean()) / 1e3) * 1e3
+    spread = _spread(grams)
+    parts = (
+        readings(spread, len(grams), "g"),
+        tare_component(spread, len(grams), TARE_WORDS),
+        *force_components(calibration, value),
+    )
+    return _document(visit, "g", value, grams, parts, tuple(rejected))
+
+
+def _spread(values: NDArray[np.float64]) -> float:
+    return float(values.std(ddof=1)) if len(values) > 1 else 0.0
 
 
 def _document(
     visit: Visit,
     unit: str,
     value: float | None,
-    spread: float,
-    u: float,
-    readings: int,
+    used: NDArray[np.float64],
+    parts: Sequence[Component],
     rejected: tuple[str, ...],
 ) -> PointDocument:
-    pressure = visit.pressure_kpa
     return PointDocument.model_validate(
         {
             "key": visit.key,
@@ -102,13 +129,20 @@ def _document(
             "settled_s": visit.settled_s,
             "measured_from_s": visit.measured_from_s,
             "measured_to_s": visit.measured_to_s,
-            "pressure_kpa": float(pressure.mean()),
-            "pressure_sd_kpa": float(pressure.std(ddof=1)) if len(pressure) > 1 else 0.0,
+            "pressure_kpa": visit.pressure_kpa,
+            "pressure_sd_kpa": _spread(visit.indicated_kpa),
+            "pressure_parts": _lines(visit.pressure_components),
             "value": value,
-            "value_sd": spread,
-            "value_u": u,
+            "value_sd": _spread(used),
+            "value_u": combine(0.0, parts).u,
+            "value_parts": _lines(parts),
             "unit": unit,
-            "readings": readings,
+            "readings": len(used),
             "rejected": rejected,
         }
     )
+
+
+def _lines(parts: Sequence[Component]) -> list[dict[str, object]]:
+    """Components as the documents keep them: JSON knows no infinity."""
+    return [asdict(p) | {"dof": p.dof if math.isfinite(p.dof) else None} for p in parts]

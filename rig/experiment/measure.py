@@ -16,7 +16,7 @@ from rig.link.client import Message, RigLink
 from rig.link.schema import Schema
 from rig.record.documents import AngleReading, PointDocument, PointKey
 from rig.record.writer import RunWriter
-from rig.spec.calibration import LoadCellCalibration
+from rig.spec.calibration import CameraCalibration, LoadCellCalibration
 from rig.vision.measure import AngleMeter
 
 RETRY_FACTOR = 2
@@ -64,6 +64,7 @@ class AngleMeasurement:
 
     camera: Camera
     meter: AngleMeter
+    calibration: CameraCalibration
     frames: int
     frame_period_s: float
 
@@ -89,7 +90,7 @@ class AngleMeasurement:
                 f"trusted; the last one: {readings[-1].reason}. They are in the log. Check light, "
                 "focus and view (`rig measure` on a frame tells more), then `rig resume` the run."
             )
-        return angle_point(arrival.visit(from_s, messages), readings)
+        return angle_point(arrival.visit(from_s, messages), readings, self.calibration)
 
 
 @dataclass(frozen=True)

@@ -90,10 +90,11 @@ class ReplayedRun(RunReader):
                 settled_s=point.settled_s,
                 measured_from_s=point.measured_from_s,
                 measured_to_s=point.measured_to_s,
-                pressure_kpa=pressure["pressure_kpa"][inside],
+                indicated_kpa=pressure["pressure_kpa"][inside],
+                transducer=self._calibrations.transducer,
             )
             if point.key.experiment == "deformation":
-                yield angle_point(visit, by_key[point.key])
+                yield angle_point(visit, by_key[point.key], self._calibrations.camera)
             else:
                 chosen = _within(point, cell["time_s"])
                 readings = [

@@ -257,7 +257,13 @@ def _sweep(
         started_s = go_to(link, key.target_kpa)
         settled_s = settle(link, key.target_kpa, section.settling)
         link.wait(section.hold)
-        arrival = Arrival(key, started_s, settled_s, section.settling.tolerance / 1e3)
+        arrival = Arrival(
+            key,
+            started_s,
+            settled_s,
+            section.settling.tolerance / 1e3,
+            context.request.setup.calibrations.transducer,
+        )
         point = measure(link, record, arrival)
         recorder.flush()
         record.point(point, link.now_s)
@@ -274,6 +280,7 @@ def _measurement(context: RunContext, experiment: ExperimentName) -> Measurement
         return AngleMeasurement(
             camera=context.bench.camera,
             meter=AngleMeter(calibrations.camera, calibrations.ruler),
+            calibration=calibrations.camera,
             frames=section.frames,
             frame_period_s=1 / setup.bench.camera.frame_rate,
         )

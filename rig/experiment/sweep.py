@@ -13,6 +13,7 @@ from rig.experiment.evaluate import CellReading, Visit
 from rig.link.client import Message, RigLink
 from rig.link.schema import Schema
 from rig.record.documents import PointKey
+from rig.spec.calibration import TransducerCalibration
 from rig.spec.protocol import Settling, SweepProtocol
 
 
@@ -97,6 +98,7 @@ class Arrival:
     started_s: float
     settled_s: float
     tolerance_kpa: float
+    transducer: TransducerCalibration
 
     def visit(self, from_s: float, messages: Sequence[Message]) -> Visit:
         """The visit measured since `from_s` by the messages received since then.
@@ -117,5 +119,11 @@ class Arrival:
                 "not recorded. Look for a leak or a disturbance, or widen settling.tolerance."
             )
         return Visit(
-            self.key, self.started_s, self.settled_s, from_s, messages[-1].time_s, pressure
+            self.key,
+            self.started_s,
+            self.settled_s,
+            from_s,
+            messages[-1].time_s,
+            pressure,
+            self.transducer,
         )

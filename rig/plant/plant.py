@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.plant._plant import ffi, lib
+from rig.plant.instruments import Instruments
 from rig.plant.specimen import Specimen
 from rig.spec.bench import BenchSpec
-from rig.spec.calibration import LoadCellCalibration, TransducerCalibration
 from rig.spec.quantity import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
@@ -35,6 +35,8 @@ class Fixture(IntEnum):
 
     FREE = int(lib.PLANT_FREE)
     BLOCKED = int(lib.PLANT_BLOCKED)
+    PLUGGED = int(lib.PLANT_PLUGGED)
+    """The tube ends in a plug; there is no actuator."""
 
 
 class Switch(IntEnum):
@@ -86,42 +88,6 @@ class Truth:
     valve_opened: float
     """Plant time at which the closed valve was last opened; 0 if never."""
     valve_open: bool
-
-
-@dataclass(frozen=True)
-class HiddenErrors:
-    """How this bench's instruments differ from their calibrations, and where the plunger stands.
-
-    Drawn once from the stated uncertainties, so that those are true to the bench.
-    """
-
-    transducer_gain: float
-    """Relative error of the gain."""
-    transducer_offset: float
-    """Gauge pressure in Pa that the transducer shows at ambient before zeroing."""
-    counts_per_gram: float
-    """Relative error of the load cell's sensitivity."""
-    load_cell_zero_counts: float
-    start_volume: float
-    """Volume in m3 by which the plunger is pushed in at power-on."""
-
-    @staticmethod
-    def draw(
-        bench: BenchSpec,
-        transducer: TransducerCalibration,
-        load_cell: LoadCellCalibration,
-        rng: np.random.Generator,
-    ) -> HiddenErrors:
-        """Draw the errors for one bench."""
-        assert bench.virtual is not None
-        sensors = bench.virtual.sensors
-        return HiddenErrors(
-            transducer_gain=rng.normal(0, transducer.gain_u),
-            transducer_offset=rng.normal(0, sensors.transducer_offset),
-            counts_per_gram=rng.normal(0, load_cell.counts_per_gram_u),
-            load_cell_zero_counts=rng.normal(0, 20 * load_cell.counts_per_gram),
-            start_volume=bench.syringe.volume * rng.uniform(0.02, 0.2),
-        )
 
 
 class ResponseTables(Protocol):
@@ -182,6 +148,10 @@ class Plant:
         """Free the tip, or block it against the load cell."""
         lib.plant_set_fixture(self._plant, int(fixture))
 
+    def set_cell_load(self, force: float) -> None:
+        """Masses on the load cell, as their force in N."""
+        lib.plant_set_cell_load(self._plant, force)
+
     def set_faults(self, faults: Faults) -> None:
         """Break things, or heal them."""
         lib.plant_set_faults(self._plant, ffi.new("plant_faults *", vars(faults)))
@@ -222,32 +192,29 @@ class Plant:
 
 def plant_parameters(
     bench: BenchSpec,
-    transducer: TransducerCalibration,
-    load_cell: LoadCellCalibration,
-    specimen: Specimen,
-    errors: HiddenErrors,
+    specimen: Specimen | None,
+    instruments: Instruments,
     pressure_limit: float,
 ) -> dict[str, Any]:
     """Parameters of the C plant from the specs; SI units.
 
-    `pressure_limit` in Pa scales the hysteresis of the specimen.
+    `pressure_limit` in Pa scales the hysteresis of the specimen. Without a specimen its dynamics
+    are none.
     """
     assert bench.virtual is not None
     virtual = bench.virtual
+    sensors = virtual.sensors
     radius = bench.tubing.inner_diameter / 2
     tube_resistance = 8 * AIR_VISCOSITY * bench.tubing.length / (np.pi * radius**4)
-    counts_per_newton = (
-        load_cell.counts_per_gram * (1 + errors.counts_per_gram) / (1e-3 * STANDARD_GRAVITY)
-    )
-    gain = transducer.gain * (1 + errors.transducer_gain)
+    counts_per_newton = instruments.counts_per_gram / (1e-3 * STANDARD_GRAVITY)
     return {
         "ambient_pressure": bench.ambient.pressure,
         "ambient_temperature": bench.ambient.temperature,
-        "volume_per_step": bench.volume_per_step,
-        "backlash_volume": bench.syringe.area * bench.lead_screw.backlash,
+        "volume_per_step": instruments.volume_per_step,
+        "backlash_volume": instruments.backlash,
         "syringe_volume": bench.syringe.volume,
-        "dead_volume": bench.syringe.dead_volume,
-        "start_volume": errors.start_volume,
+        "dead_volume": instruments.dead_volume,
+        "start_volume": instruments.start_volume,
         "tube_volume": bench.tubing.volume,
         "tube_resistance": tube_resistance,
         # the valve vents through a short piece of the same tube (a guess; the paper has no valve)
@@ -255,25 +222,30 @@ def plant_parameters(
         "leak_conductance": virtual.pneumatics.leak / REFERENCE_LEAK_PRESSURE,
         "heat_exchange_time": virtual.pneumatics.heat_exchange_time,
         "response_time": RESPONSE_TIME,
-        "creep_share": specimen.creep_share,
-        "creep_time": specimen.creep_time,
-        "play_share": specimen.hysteresis,
+        "creep_share": specimen.creep_share if specimen else 0.0,
+        "creep_time": specimen.creep_time if specimen else 1.0,
+        "play_share": specimen.hysteresis if specimen else 0.0,
         "play_radius": [r * pressure_limit for r in PLAY_RADII],
-        "transducer_gain": gain,
-        "transducer_voltage_at_zero": transducer.offset_voltage + errors.transducer_offset / gain,
-        "transducer_noise": virtual.sensors.transducer_noise,
+        "transducer_gain": instruments.transducer_gain,
+        "transducer_voltage_at_zero": instruments.voltage_at_zero,
+        "transducer_noise": sensors.transducer_noise,
+        "transducer_bow": instruments.transducer_bow,
+        "transducer_span": bench.transducer.pressure_high,
+        "transducer_drift": sensors.transducer_drift,
         "adc_reference": bench.adc.reference,
         "adc_levels": 2.0**bench.adc.bits,
         "counts_per_newton": counts_per_newton,
-        "load_cell_zero_counts": errors.load_cell_zero_counts,
-        "load_cell_noise_counts": virtual.sensors.load_cell_noise
-        * STANDARD_GRAVITY
-        * counts_per_newton,
-        "load_cell_creep_share": virtual.sensors.load_cell_creep,
-        "load_cell_creep_time": virtual.sensors.load_cell_creep_time,
+        "load_cell_zero_counts": instruments.load_cell_zero_counts,
+        "load_cell_noise_counts": sensors.load_cell_noise * STANDARD_GRAVITY * counts_per_newton,
+        "load_cell_creep_share": instruments.load_cell_creep,
+        "load_cell_creep_time": sensors.load_cell_creep_time,
+        "load_cell_bow": instruments.load_cell_bow * STANDARD_GRAVITY,
+        "load_cell_span": bench.load_cell.capacity * STANDARD_GRAVITY,
+        "load_cell_drift": sensors.load_cell_drift * STANDARD_GRAVITY,
         "load_cell_period": 1 / bench.load_cell.sample_rate,
         "bad_word_probability": min(
             1.0,
-            1 / (bench.load_cell.sample_rate * virtual.sensors.bad_word_interval),
+            1 / (bench.load_cell.sample_rate * sensors.bad_word_interval),
         ),
+        "drift_time": sensors.drift_time,
     }

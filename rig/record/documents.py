@@ -47,6 +47,20 @@ class PointKey(Document):
     target_kpa: float
 
 
+class UncertaintyPart(Document):
+    """One line of an uncertainty budget; see `rig.validate.uncertainty.Component`."""
+
+    name: str
+    kind: Literal["A", "B"]
+    distribution: Literal["normal", "rectangular"]
+    u: float
+    """Standard uncertainty of the input, in `unit`."""
+    unit: str
+    sensitivity: float
+    dof: float | None = None
+    """Degrees of freedom; None if the uncertainty counts as exactly known."""
+
+
 class PointDocument(Document):
     """One measured point: when, at what pressure, and what came out."""
 
@@ -58,7 +72,8 @@ class PointDocument(Document):
     measured_from_s: float
     measured_to_s: float
     pressure_kpa: float
-    """Mean of the measured pressure between measured_from_s and measured_to_s."""
+    """Mean of the measured pressure between measured_from_s and measured_to_s, corrected as the
+    transducer's calibration says."""
     pressure_sd_kpa: float
     value: float | None
     """Angle in degrees (deformation) or force in grams (blocked force); None if all rejected."""
@@ -66,6 +81,10 @@ class PointDocument(Document):
     """Standard deviation of single readings."""
     value_u: float
     """Combined standard uncertainty of `value`: readings and calibration."""
+    value_parts: tuple[UncertaintyPart, ...]
+    """The budget of `value_u`."""
+    pressure_parts: tuple[UncertaintyPart, ...]
+    """The budget of `pressure_kpa`."""
     unit: Literal["deg", "g"]
     readings: int
     """Accepted readings behind `value`."""

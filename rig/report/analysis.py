@@ -13,11 +13,20 @@ from numpy.typing import NDArray
 from rig.control.errors import ControlError
 from rig.control.step import StepMetrics, step_metrics
 from rig.mechanics.response import Response
-from rig.record.documents import Direction, ExitStatus, ExperimentName, PointDocument
+from rig.record.documents import ExitStatus, ExperimentName, PointDocument
 from rig.record.reader import RunReader
 from rig.report.data import EXPERIMENTS, RunData, by_level, load_run, planned_points
+from rig.report.inputs import input_uncertainty
+from rig.report.levels import (
+    Level,
+    calibration_components,
+    levels_of,
+    nearest_scatter,
+    repeats_component,
+)
 from rig.report.summary import (
     BudgetLine,
+    BudgetSummary,
     ControllerSummary,
     ExperimentSummary,
     HysteresisSummary,
@@ -34,12 +43,12 @@ from rig.report.summary import (
     StepSummary,
     ValidationSummary,
 )
-from rig.spec.calibration import TransducerCalibration
 from rig.spec.published import PublishedReference
 from rig.spec.quantity import STANDARD_GRAVITY
+from rig.spec.workspace import Setup
+from rig.validate.budget import READINGS
 from rig.validate.metrics import (
     ComparisonErrors,
-    Repeatability,
     ValidationStatement,
     bias,
     hysteresis,
@@ -47,9 +56,10 @@ from rig.validate.metrics import (
     normalised,
     repeatability,
     rmse,
+    same_variance,
     validation_statement,
 )
-from rig.validate.uncertainty import Component, Estimate, combine
+from rig.validate.uncertainty import Component, Estimate, combine, coverage_factor
 
 Array = NDArray[np.float64]
 PRESSURE_NOISE_KPA = 0.03
@@ -59,10 +69,6 @@ QUANTITIES: dict[ExperimentName, str] = {
     "blocked_force": "blocked force",
 }
 UNITS: dict[ExperimentName, str] = {"deformation": "deg", "blocked_force": "g"}
-INSTRUMENTS: dict[ExperimentName, str] = {
-    "deformation": "camera and vision",
-    "blocked_force": "load cell",
-}
 
 
 def build_summary(
@@ -137,7 +143,7 @@ def _experiment(
     references: Sequence[PublishedReference],
 ) -> ExperimentSummary:
     points = data.points_of(name)
-    levels = _levels(name, points, data.setup.calibrations.transducer)
+    levels = levels_of(points)
     up = [level for level in levels if level.direction == "up"]
     span = max(v.mean for v in up) - min(v.mean for v in up) if up else None
     section = data.section(name)
@@ -147,115 +153,16 @@ def _experiment(
         planned=planned_points(section) if section is not None else len(points),
         measured=len(points),
         span=span,
-        points=tuple(_level_summary(level, points) for level in levels),
+        points=tuple(_level_summary(level, points, UNITS[name]) for level in levels),
         repeatability=_repeatability(levels, UNITS[name]),
         hysteresis=_hysteresis(points, UNITS[name]),
         controller=_controller(data, points, name),
-        budget=_budget(up, UNITS[name]),
-        models=_models(name, up, predictions, span, data.setup.calibrations.transducer),
+        models=_models(name, up, predictions, span, data.setup),
         references=_references(name, data, references),
     )
 
 
-@dataclass(frozen=True)
-class Level:
-    """The repeats of one pressure on one branch, with the parts of its uncertainty."""
-
-    direction: Direction
-    target_kpa: float
-    points: tuple[PointDocument, ...]
-    components: tuple[Component, ...]
-
-    @property
-    def values(self) -> Array:
-        """Measured values, (repeats,)."""
-        return np.array([point.value for point in self.points], dtype=np.float64)
-
-    @property
-    def pressures_kpa(self) -> Array:
-        """Measured pressures, (repeats,)."""
-        return np.array([point.pressure_kpa for point in self.points])
-
-    @property
-    def mean(self) -> float:
-        """Mean of the repeats."""
-        return float(self.values.mean())
-
-    @property
-    def estimate(self) -> Estimate:
-        """The mean with its combined uncertainty."""
-        return combine(self.mean, self.components)
-
-
-def _levels(
-    name: ExperimentName, points: Sequence[PointDocument], transducer: TransducerCalibration
-) -> list[Level]:
-    groups = by_level(points)
-    measured = {
-        key: np.array([p.value for p in group], dtype=np.float64) for key, group in groups.items()
-    }
-    pooled = repeatability(list(measured.values()))
-    means = {key: float(values.mean()) for key, values in measured.items()}
-    levels = []
-    for (direction, target), group in groups.items():
-        branch = {kpa: mean for (way, kpa), mean in means.items() if way == direction}
-        slope = _slope(branch, target)
-        components = [
-            _repeats(measured[direction, target], group, pooled),
-            Component(INSTRUMENTS[name], _calibration_u(group)),
-        ]
-        for source, u_kpa in pressure_uncertainty(transducer, target).items():
-            components.append(Component(source, abs(slope) * u_kpa))
-        way: Direction = "up" if direction == "up" else "down"
-        levels.append(Level(way, target, tuple(group), tuple(components)))
-    return levels
-
-
-def _repeats(
-    values: Array, group: Sequence[PointDocument], pooled: Repeatability | None
-) -> Component:
-    """Type A: from the repeats; for a single one from the scatter of the repeats elsewhere.
-
-    Where nothing was repeated at all only the scatter of the single point's readings is known.
-    """
-    if values.size > 1:
-        return Component(
-            "repeats", float(values.std(ddof=1)) / math.sqrt(values.size), values.size - 1
-        )
-    if pooled is not None:
-        return Component("repeats", pooled.sd, pooled.dof)
-    (point,) = group
-    u = point.value_sd / math.sqrt(max(1, point.readings))
-    return Component("readings (nothing was repeated)", u, max(1, point.readings - 1))
-
-
-def _calibration_u(group: Sequence[PointDocument]) -> float:
-    """Type B part of the points' uncertainty: it is common to the repeats."""
-    squares = [max(0.0, p.value_u**2 - p.value_sd**2 / max(1, p.readings)) for p in group]
-    return math.sqrt(float(np.mean(squares)))
-
-
-def pressure_uncertainty(
-    transducer: TransducerCalibration, pressure_kpa: float
-) -> dict[str, float]:
-    """Standard uncertainties in kPa of a measured pressure, by source; all of type B."""
-    return {
-        "pressure: zero": transducer.zero_u / 1e3,
-        "pressure: gain": transducer.gain_u * pressure_kpa,
-        "pressure: linearity": transducer.linearity_u / 1e3,
-    }
-
-
-def _slope(branch: Mapping[float, float], target: float) -> float:
-    """Slope of a measured branch at one of its pressures, in its unit per kPa."""
-    if len(branch) < 2:
-        return 0.0
-    kpa = np.array(sorted(branch))
-    slopes = np.gradient(np.array([branch[p] for p in kpa]), kpa)
-    return float(slopes[np.searchsorted(kpa, target)])
-
-
-def _level_summary(level: Level, points: Sequence[PointDocument]) -> LevelSummary:
+def _level_summary(level: Level, points: Sequence[PointDocument], unit: str) -> LevelSummary:
     here = [
         p
         for p in points
@@ -269,6 +176,8 @@ def _level_summary(level: Level, points: Sequence[PointDocument]) -> LevelSummar
         mean=level.mean,
         sd=float(values.std(ddof=1)) if values.size > 1 else None,
         u95=level.estimate.u95,
+        budget=_budget(level.components, unit),
+        pressure_budget=_budget(level.pressure_components, "kPa"),
         repeats=values.size,
         readings=sum(p.readings for p in here),
         rejected=sum(len(p.rejected) for p in here),
@@ -276,11 +185,21 @@ def _level_summary(level: Level, points: Sequence[PointDocument]) -> LevelSummar
 
 
 def _repeatability(levels: Sequence[Level], unit: str) -> RepeatabilitySummary | None:
-    found = repeatability([level.values for level in levels])
+    repeated = [level for level in levels if level.values.size > 1]
+    found = repeatability([level.values for level in repeated])
     if found is None:
         return None
+    sd = [float(level.values.std(ddof=1)) for level in repeated]
+    largest = int(np.argmax(sd))
     return RepeatabilitySummary(
-        sd=found.sd, low=found.low, high=found.high, limit=found.limit, unit=unit
+        sd=found.sd,
+        low=found.low,
+        high=found.high,
+        limit=found.limit,
+        unit=unit,
+        homogeneous=same_variance([level.values for level in repeated]),
+        largest=sd[largest],
+        largest_pressure_kpa=repeated[largest].target_kpa,
     )
 
 
@@ -367,27 +286,34 @@ def _controller(
     )
 
 
-def _budget(levels: Sequence[Level], unit: str) -> tuple[BudgetLine, ...]:
-    """Contributions to the uncertainty of the ascending means, each over all levels."""
-    by_source: dict[str, list[Component]] = {}
-    for level in levels:
-        for component in level.components:
-            by_source.setdefault(component.name, []).append(component)
-    variances = {
-        source: sum(c.u**2 for c in parts) / len(levels) for source, parts in by_source.items()
-    }
-    total = sum(variances.values())
-    return tuple(
-        BudgetLine(
-            source=source,
-            kind="A" if math.isfinite(parts[0].dof) else "B",
-            rms=math.sqrt(variances[source]),
-            largest=max(c.u for c in parts),
-            share_percent=100 * variances[source] / total if total else 0.0,
-            unit=unit,
-        )
-        for source, parts in by_source.items()
+def _budget(components: Sequence[Component], unit: str) -> BudgetSummary:
+    """A budget as a table; `unit` is that of the result."""
+    whole = combine(0.0, components)
+    return BudgetSummary(
+        lines=tuple(
+            BudgetLine(
+                source=c.name,
+                kind=c.kind,
+                distribution=c.distribution,
+                u=c.u,
+                unit=c.unit,
+                sensitivity=c.sensitivity,
+                degrees_of_freedom=_finite(c.dof),
+                contribution=c.contribution,
+                share_percent=100 * (c.contribution / whole.u) ** 2 if whole.u else 0.0,
+            )
+            for c in components
+        ),
+        unit=unit,
+        u=whole.u,
+        degrees_of_freedom=_finite(whole.dof),
+        coverage_factor=coverage_factor(whole.dof),
+        u95=whole.u95,
     )
+
+
+def _finite(dof: float) -> float | None:
+    return dof if math.isfinite(dof) else None
 
 
 def _models(
@@ -395,7 +321,7 @@ def _models(
     levels: Sequence[Level],
     predictions: Mapping[str, Response],
     span: float | None,
-    transducer: TransducerCalibration,
+    setup: Setup,
 ) -> dict[str, ModelSummary]:
     found = {}
     for model, response in predictions.items():
@@ -404,7 +330,7 @@ def _models(
         curve = ModelCurve(response, name)
         covered = [v for v in levels if curve.reaches(float(v.pressures_kpa.mean()))]
         if covered:
-            found[model] = _model(name, covered, curve, span or 0.0, transducer)
+            found[model] = _model(model, name, covered, curve, span or 0.0, setup)
     return found
 
 
@@ -447,14 +373,24 @@ class ModelCurve:
 
 
 def _model(
+    model: str,
     name: ExperimentName,
     levels: Sequence[Level],
     curve: ModelCurve,
     span: float,
-    transducer: TransducerCalibration,
+    setup: Setup,
 ) -> ModelSummary:
     unit = UNITS[name]
-    errors = comparison_errors(levels, curve, transducer, INSTRUMENTS[name])
+    inputs = input_uncertainty(
+        setup.actuator,
+        setup.material,
+        model,
+        name,
+        curve.value,
+        lambda response: predicted_value(response, name),
+        np.array([level.pressure.value for level in levels]),
+    )
+    errors = comparison_errors(levels, curve, inputs)
     level, largest = maximum_error(errors)
     root = rmse(errors)
     statement = validation_statement(errors)
@@ -474,7 +410,7 @@ def _model(
             beyond=statement.beyond,
             coverage=statement.coverage,
             agrees=statement.agrees,
-            statement=_in_words(statement),
+            statement=_in_words(statement, bool(inputs)),
         ),
         errors=tuple(
             LevelError(
@@ -482,38 +418,55 @@ def _model(
                 predicted=float(p),
                 error=float(e),
                 u_validation=float(u),
+                u_input=float(i),
             )
-            for v, p, e, u in zip(levels, predicted, errors.error, errors.u_validation, strict=True)
+            for v, p, e, u, i in zip(
+                levels,
+                predicted,
+                errors.error,
+                errors.u_validation,
+                errors.u_simulation,
+                strict=True,
+            )
         ),
     )
 
 
 def comparison_errors(
-    levels: Sequence[Level], curve: ModelCurve, transducer: TransducerCalibration, instrument: str
+    levels: Sequence[Level], curve: ModelCurve, inputs: Mapping[str, Array]
 ) -> ComparisonErrors:
     """Model minus experiment at each level, at the pressures that were really there.
 
     Calibrations act at all levels together; an error of pressure moves along the model's slope.
-    The models' own inputs (modulus, dimensions) are taken as stated in the specs.
+    `inputs` are what one standard uncertainty of each of the model's inputs does, (n,).
     """
     error, u_random, dof = [], [], []
-    common: dict[str, list[float]] = {instrument: []}
-    all_differences = [curve.value(level.pressures_kpa) - level.values for level in levels]
-    pooled = repeatability(all_differences)
-    for level, differences in zip(levels, all_differences, strict=True):
-        repeats = _repeats(differences, level.points, pooled)
-        error.append(float(differences.mean()))
-        u_random.append(repeats.u)
+    common: dict[str, list[float]] = {}
+    differences = [curve.value(level.pressures_kpa) - level.values for level in levels]
+    repeated = {
+        level.target_kpa: d for level, d in zip(levels, differences, strict=True) if d.size > 1
+    }
+    for index, (level, difference) in enumerate(zip(levels, differences, strict=True)):
+        scatter = nearest_scatter(repeated, level.target_kpa)
+        repeats = repeats_component(difference, level.points, scatter)
+        error.append(float(difference.mean()))
+        u_random.append(repeats.contribution)
         dof.append(repeats.dof)
-        common[instrument].append(_calibration_u(level.points))
         slope = curve.slope(float(level.pressures_kpa.mean()))
-        for source, u_kpa in pressure_uncertainty(transducer, level.target_kpa).items():
-            common.setdefault(source, []).append(slope * u_kpa)
+        effects = {c.name: c.sensitivity * c.u for c in calibration_components(level.points)}
+        effects |= {
+            c.name: slope * c.sensitivity * c.u
+            for c in level.pressure_components
+            if not c.name.startswith(READINGS)
+        }
+        for source, effect in effects.items():
+            common.setdefault(source, [0.0] * len(levels))[index] = effect
     return ComparisonErrors(
         error=np.array(error),
         u_random=np.array(u_random),
         dof=np.array(dof, dtype=np.float64),
         u_common={source: np.array(u) for source, u in common.items()},
+        u_input=inputs,
     )
 
 
@@ -521,7 +474,8 @@ def _quantity(estimate: Estimate, unit: str) -> Quantity:
     return Quantity(value=estimate.value, unit=unit, u95=estimate.u95)
 
 
-def _in_words(statement: ValidationStatement) -> str:
+def _in_words(statement: ValidationStatement, inputs: bool) -> str:
+    """`inputs` says whether the uncertainty of the model's inputs is in the statement."""
     k = f"k = {statement.coverage:g}"
     if statement.agrees:
         return (
@@ -532,8 +486,14 @@ def _in_words(statement: ValidationStatement) -> str:
     return (
         f"at {statement.beyond} of {statement.levels} pressures the model differs from the "
         f"experiment by more than the expanded validation uncertainty ({k}), by up to "
-        f"{statement.largest_ratio:.3g} times: more than the measurement explains. How far "
-        f"modulus and dimensions of the printed part are from the spec is not in that uncertainty"
+        f"{statement.largest_ratio:.3g} times: "
+        + (
+            "more than the measurement and the part's tolerances of modulus and wall explain"
+            if inputs
+            else "more than the measurement explains. How far modulus and dimensions of the "
+            "printed part are from the spec is not in that uncertainty: its spec states no "
+            "tolerances"
+        )
     )
 
 

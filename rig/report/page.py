@@ -33,6 +33,7 @@ from rig.report.words import (
     count,
     decimals_for,
     duration,
+    freedom,
     model_name,
     number,
     significant,
@@ -63,6 +64,7 @@ def environment() -> Environment:
     made.filters |= {
         "number": number,
         "significant": significant,
+        "freedom": freedom,
         "duration": duration,
         "count": count,
         "model": model_name,

@@ -40,6 +40,37 @@ class Quantity(SummaryModel):
     u95: Number
 
 
+class BudgetLine(SummaryModel):
+    """One input quantity of a measurement, and what it does to the result (GUM, Table H.1)."""
+
+    source: str
+    kind: Literal["A", "B"]
+    distribution: Literal["normal", "rectangular"]
+    u: Number
+    """Standard uncertainty of the input, in `unit`."""
+    unit: str
+    sensitivity: Number
+    degrees_of_freedom: Number | None
+    """None if the uncertainty counts as exactly known."""
+    contribution: Number
+    """Standard uncertainty that it gives the result, in the budget's unit."""
+    share_percent: Number
+    """Of the variance."""
+
+
+class BudgetSummary(SummaryModel):
+    """What makes one result uncertain, line by line, combined and expanded."""
+
+    lines: tuple[BudgetLine, ...]
+    unit: str
+    u: Number
+    """Combined standard uncertainty."""
+    degrees_of_freedom: Number | None
+    """Effective, after Welch and Satterthwaite; None if infinite."""
+    coverage_factor: Number
+    u95: Number
+
+
 class LevelSummary(SummaryModel):
     """All repeats of one pressure on one branch."""
 
@@ -51,6 +82,10 @@ class LevelSummary(SummaryModel):
     sd: Number | None
     """Of the repeats; None for a single one."""
     u95: Number
+    budget: BudgetSummary
+    """Of `mean`."""
+    pressure_budget: BudgetSummary
+    """Of `measured_pressure_kpa`."""
     repeats: int
     readings: int
     rejected: int
@@ -67,6 +102,11 @@ class RepeatabilitySummary(SummaryModel):
     limit: Number
     """Two single results differ by more than this in one case of twenty."""
     unit: str
+    homogeneous: bool
+    """Whether one scatter for all pressures is tenable (Cochran's test, 5 %)."""
+    largest: Number
+    """Standard deviation where repeats scatter most."""
+    largest_pressure_kpa: float
 
 
 class HysteresisSummary(SummaryModel):
@@ -108,19 +148,6 @@ class ControllerSummary(SummaryModel):
     steps: tuple[StepSummary, ...]
 
 
-class BudgetLine(SummaryModel):
-    """One contribution to the uncertainty of the means."""
-
-    source: str
-    kind: Literal["A", "B"]
-    rms: Number
-    """Root mean square over the ascending pressures, standard uncertainty."""
-    largest: Number
-    share_percent: Number
-    """Of the mean variance."""
-    unit: str
-
-
 class LevelError(SummaryModel):
     """Model minus experiment at one pressure."""
 
@@ -129,6 +156,8 @@ class LevelError(SummaryModel):
     error: Number
     u_validation: Number
     """Standard validation uncertainty (V&V 20)."""
+    u_input: Number
+    """Its part from the model's inputs: modulus and wall thickness of the printed part."""
 
 
 class ValidationSummary(SummaryModel):
@@ -191,7 +220,6 @@ class ExperimentSummary(SummaryModel):
     repeatability: RepeatabilitySummary | None
     hysteresis: HysteresisSummary | None
     controller: ControllerSummary | None
-    budget: tuple[BudgetLine, ...]
     models: dict[str, ModelSummary]
     references: tuple[Reference, ...]
 

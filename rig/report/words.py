@@ -48,6 +48,11 @@ def significant(value: float, digits: int = 3) -> str:
     return number(value, max(0, digits - 1 - math.floor(math.log10(abs(value)))))
 
 
+def freedom(dof: float | None) -> str:
+    """Degrees of freedom, rounded down as tables of t want it; infinite for None."""
+    return "\N{INFINITY}" if dof is None else str(math.floor(dof + 1e-9))
+
+
 def duration(seconds: float) -> str:
     """Bench time in minutes, or hours from two on."""
     if seconds < 120:

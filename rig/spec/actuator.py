@@ -130,6 +130,16 @@ class ActuatorLimits(SpecModel):
     pressure: Pressure = Field(gt=0, description="highest gauge pressure")
 
 
+class PartTolerances(SpecModel):
+    """How well the printed part is known; relative standard uncertainties.
+
+    They tell an error of a model from one of its inputs.
+    """
+
+    young_modulus: Ratio = Field(ge=0)
+    wall_thickness: Ratio = Field(ge=0)
+
+
 class ActuatorSpec(SpecModel):
     """One actuator: what it is, what it is made of, how far it may go, what to predict."""
 
@@ -139,4 +149,7 @@ class ActuatorSpec(SpecModel):
     geometry: Geometry
     material: str = Field(description="name of a file in models/materials, or a path")
     limits: ActuatorLimits
+    tolerances: PartTolerances | None = Field(
+        None, description="how well the printed part is known; without it, as drawn"
+    )
     predictions: tuple[ModelName, ...] = ("beam",)

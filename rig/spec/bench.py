@@ -59,6 +59,9 @@ class Syringe(SpecModel):
     volume: Volume = Field(gt=0)
     inner_diameter: Length = Field(gt=0)
     dead_volume: Volume = Field(ge=0, description="left when the plunger is fully in")
+    calibration: str | None = Field(
+        None, description="file in calibration/, or a path; replaces what the drawing says"
+    )
 
     @property
     def area(self) -> float:
@@ -212,14 +215,46 @@ class VirtualPneumatics(SpecModel):
 
 
 class VirtualSensors(SpecModel):
-    """Noise and drift of the simulated sensors."""
+    """How simulated sensors differ from their data sheets; standard deviations unless said.
 
-    transducer_noise: Voltage = Field(ge=0, description="standard deviation of one conversion")
-    transducer_offset: Pressure = Field(ge=0, description="standard deviation before zeroing")
-    load_cell_noise: Mass = Field(ge=0)
-    load_cell_creep: Ratio = Field(ge=0, description="share of the load")
+    What a bench has hidden is drawn from here, not from the calibrations that it is used with: a
+    better calibration finds the same instrument again.
+    """
+
+    transducer_noise: Voltage = Field(ge=0, description="of one conversion")
+    transducer_offset: Pressure = Field(ge=0, description="before zeroing")
+    transducer_gain: Ratio = Field(ge=0, description="relative, about the data sheet's")
+    transducer_bow: Pressure = Field(
+        ge=0, description="departure from a straight line in the middle of the range"
+    )
+    transducer_drift: Pressure = Field(ge=0, description="change of the zero over a long time")
+    load_cell_sensitivity: Number = Field(gt=0, description="counts per gram, nominal")
+    load_cell_gain: Ratio = Field(ge=0, description="relative, of the sensitivity")
+    load_cell_bow: Mass = Field(ge=0, description="departure from a straight line at half capacity")
+    load_cell_noise: Mass = Field(ge=0, description="of one conversion")
+    load_cell_creep: Ratio = Field(ge=0, description="of the share of the load that creeps")
     load_cell_creep_time: Duration = Field(gt=0)
+    load_cell_drift: Mass = Field(ge=0, description="change of the zero over a long time")
+    drift_time: Duration = Field(gt=0, description="correlation time of both zeros")
     bad_word_interval: Duration = Field(gt=0, description="mean time between bad HX711 words")
+
+
+class VirtualDrive(SpecModel):
+    """How the simulated plunger's drive differs from its drawing; relative standard deviations."""
+
+    volume_per_step: Ratio = Field(ge=0)
+    dead_volume: Ratio = Field(ge=0)
+    backlash: Ratio = Field(ge=0)
+
+
+class VirtualReferences(SpecModel):
+    """What simulated instruments are calibrated against, and how well that is known."""
+
+    gauge_u: Ratio = Field(ge=0, description="standard deviation of the gauge's scale, relative")
+    gauge_resolution: Pressure = Field(ge=0, description="last digit of the gauge")
+    mass_u: Ratio = Field(ge=0, description="standard deviation of the set of masses, relative")
+    balance_u: Ratio = Field(ge=0, description="standard deviation of the balance's scale")
+    balance_resolution: Mass = Field(ge=0, description="last digit of the balance")
 
 
 class VirtualOptics(SpecModel):
@@ -239,7 +274,9 @@ class VirtualBench(SpecModel):
 
     specimen: Annotated[FiniteElementSpecimen | BeamSpecimen, Field(discriminator="response")]
     pneumatics: VirtualPneumatics
+    drive: VirtualDrive
     sensors: VirtualSensors
+    references: VirtualReferences
     optics: VirtualOptics
 
 

@@ -4,52 +4,162 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from rig.spec.base import Count, Date, Integer, Number, SpecModel
-from rig.spec.quantity import Length, Mass, Pressure, Ratio, TransducerGain, Voltage
+from rig.spec.base import Count, Date, Integer, Number, SpecModel, require
+from rig.spec.quantity import (
+    Length,
+    Mass,
+    Pressure,
+    Ratio,
+    Temperature,
+    TransducerGain,
+    Voltage,
+    Volume,
+)
+
+
+class Environment(SpecModel):
+    """The air around the instrument while it was calibrated."""
+
+    temperature: Temperature | None = None
+    pressure: Pressure | None = None
+    humidity: Ratio | None = Field(None, ge=0, le=1)
 
 
 class Provenance(SpecModel):
-    """Who calibrated what, when and how."""
+    """Who calibrated what, when, how, against what, and until when that counts."""
 
     date: Date
+    valid_until: Date | None = Field(None, description="last day on which runs may rely on it")
     method: str
     instrument: str
+    serial_number: str = ""
+    reference: str = Field("", description="what it was compared with, and how well that is known")
     operator: str = ""
+    environment: Environment = Environment()
     simulated: bool = Field(
-        False, strict=True, description="defines a virtual bench; never valid on a real one"
+        False, strict=True, description="of a virtual bench; never valid on a real one"
+    )
+
+    @model_validator(mode="after")
+    def _lasting(self) -> Provenance:
+        require(
+            self.valid_until is None or self.valid_until >= self.date,
+            "expected valid_until not before date",
+        )
+        return self
+
+
+class Fit(SpecModel):
+    """A least-squares fit; numbers in the units that `model` names."""
+
+    model: str
+    parameters: tuple[str, ...]
+    values: tuple[Number, ...]
+    covariance: tuple[tuple[Number, ...], ...]
+    residuals: tuple[Number, ...] = Field(description="measured minus fitted")
+    degrees_of_freedom: Integer = Field(ge=0)
+
+
+class Evidence(SpecModel):
+    """What a calibration rests on: the points as taken, and what was fitted to them."""
+
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Number, ...], ...]
+    fits: tuple[Fit, ...]
+    findings: dict[str, Number] = Field(
+        default_factory=dict, description="figures by name, with the unit in the name"
     )
 
 
-class TransducerCalibration(SpecModel):
-    """Gauge pressure = gain (voltage - offset_voltage)."""
+class Calibration(SpecModel):
+    """What the calibrations of all instruments have in common."""
 
     kind: Literal["calibration"]
+    provenance: Provenance
+    evidence: Evidence | None = None
+
+
+class TransducerCalibration(Calibration):
+    """Gauge pressure = gain (voltage - offset_voltage), and a little more in the middle.
+
+    The curve is a parabola that meets the straight line at zero and at the end of the span.
+    """
+
     instrument: Literal["transducer"]
     gain: TransducerGain
     gain_u: Ratio = Field(ge=0, description="relative standard uncertainty of the gain")
     offset_voltage: Voltage
-    zero_u: Pressure = Field(ge=0, description="standard uncertainty of the zero after zeroing")
-    linearity_u: Pressure = Field(ge=0, description="standard uncertainty from non-linearity")
-    provenance: Provenance
+    span: Pressure = Field(gt=0, description="pressure up to which it was calibrated")
+    bow: Pressure = Field(
+        0.0, description="what is added to the straight line in the middle of the span"
+    )
+    linearity_u: Pressure = Field(ge=0, description="standard uncertainty of the bow")
+    zero_u: Pressure = Field(
+        ge=0, description="standard uncertainty of the zero after zeroing, from drift"
+    )
+
+    def bow_share(self, pressure: float) -> float:
+        """Share of the bow at a gauge `pressure` in Pa: 0 at zero, 1 in the middle of the span."""
+        return bow_share(pressure, self.span)
+
+    def corrected(self, indicated: float) -> float:
+        """Gauge pressure in Pa where the straight line says `indicated`."""
+        return indicated + self.bow * self.bow_share(indicated)
 
 
-class LoadCellCalibration(SpecModel):
-    """Force in grams-force = counts / counts_per_gram, after tare."""
+class LoadCellCalibration(Calibration):
+    """Force in grams-force = counts / counts_per_gram after tare, and a little more in the middle.
 
-    kind: Literal["calibration"]
+    The curve is a parabola as that of the transducer.
+    """
+
     instrument: Literal["load-cell"]
     counts_per_gram: Number = Field(gt=0)
     counts_per_gram_u: Ratio = Field(ge=0, description="relative standard uncertainty")
-    creep_u: Mass = Field(ge=0, description="standard uncertainty from creep and drift")
-    provenance: Provenance
+    span: Mass = Field(gt=0, description="load up to which it was calibrated")
+    bow: Mass = Field(
+        0.0, description="what is added to the straight line in the middle of the span"
+    )
+    linearity_u: Mass = Field(ge=0, description="standard uncertainty of the bow")
+    creep_u: Ratio = Field(
+        ge=0, description="standard uncertainty from creep within minutes, relative to the load"
+    )
+    zero_u: Mass = Field(
+        ge=0, description="standard uncertainty of the zero after tare, from drift"
+    )
+
+    def bow_share(self, load: float) -> float:
+        """Share of the bow at a `load` in kg: 0 at zero, 1 in the middle of the span."""
+        return bow_share(load, self.span)
+
+    def corrected(self, indicated: float) -> float:
+        """Load in kg where the straight line says `indicated`."""
+        return indicated + self.bow * self.bow_share(indicated)
 
 
-class CameraCalibration(SpecModel):
+def bow_share(value: float, span: float) -> float:
+    """4 x (1 - x) with x = value / span: a parabola through both ends, 1 in the middle."""
+    x = value / span
+    return 4 * x * (1 - x)
+
+
+class SyringeCalibration(Calibration):
+    """What the plunger's drive really moves, and the volume that stays when it is fully in."""
+
+    instrument: Literal["syringe"]
+    steps_per_ml: Number = Field(gt=0)
+    steps_per_ml_u: Ratio = Field(ge=0, description="relative standard uncertainty")
+    backlash: Volume = Field(ge=0)
+    backlash_u: Volume = Field(ge=0, description="standard uncertainty")
+    dead_volume: Volume = Field(ge=0, description="without the tube")
+    dead_volume_u: Volume = Field(ge=0, description="standard uncertainty")
+
+
+class CameraCalibration(Calibration):
     """Pinhole and Brown-Conrady lens of the camera, pixels."""
 
-    kind: Literal["calibration"]
     instrument: Literal["camera"]
     width: Count = Field(le=20_000)
     height: Count = Field(le=20_000)
@@ -59,16 +169,14 @@ class CameraCalibration(SpecModel):
     centre_y: Number
     distortion: tuple[Number, Number, Number, Number, Number] = (0.0, 0.0, 0.0, 0.0, 0.0)
     angle_u_deg: Number = Field(ge=0, description="standard uncertainty of in-plane angles, deg")
-    provenance: Provenance
 
 
-class RulerCalibration(SpecModel):
+class RulerCalibration(Calibration):
     """The right-angle reference ruler in the picture.
 
     A white L with round black marks: one in the corner, then one every `pitch` on both legs.
     """
 
-    kind: Literal["calibration"]
     instrument: Literal["ruler"]
     pitch: Length = Field(gt=0, description="distance between neighbouring marks")
     marks: Integer = Field(
@@ -76,4 +184,3 @@ class RulerCalibration(SpecModel):
     )
     pitch_u: Length = Field(ge=0, description="standard uncertainty of the pitch")
     squareness_u_deg: Number = Field(ge=0, description="standard uncertainty of the right angle")
-    provenance: Provenance

@@ -15,6 +15,7 @@ from rig.spec.calibration import (
     CameraCalibration,
     LoadCellCalibration,
     RulerCalibration,
+    SyringeCalibration,
     TransducerCalibration,
 )
 from rig.spec.errors import Problem, SpecError
@@ -25,7 +26,13 @@ from rig.spec.protocol import ProtocolSpec
 from rig.spec.published import PublishedReference
 from rig.spec.tree import MAX_CHARACTERS, Tree, parse_tree
 
-AnyCalibration = TransducerCalibration | LoadCellCalibration | CameraCalibration | RulerCalibration
+AnyCalibration = (
+    TransducerCalibration
+    | LoadCellCalibration
+    | SyringeCalibration
+    | CameraCalibration
+    | RulerCalibration
+)
 AnySpec = (
     ActuatorSpec
     | MaterialSpec
@@ -49,6 +56,7 @@ KINDS: dict[str, type[BaseModel]] = {
 INSTRUMENTS: dict[str, type[AnyCalibration]] = {
     "transducer": TransducerCalibration,
     "load-cell": LoadCellCalibration,
+    "syringe": SyringeCalibration,
     "camera": CameraCalibration,
     "ruler": RulerCalibration,
 }

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri
+from scipy.special import chdtri, fdtri
 
 from rig.validate.errors import ValidateError
 from rig.validate.uncertainty import Component, Estimate, combine
@@ -39,9 +39,13 @@ class ComparisonErrors:
     u_common: Mapping[str, Array] = field(default_factory=dict)
     """For each calibration the error that one standard uncertainty of it makes at each level,
     signed: at all levels it acts together."""
+    u_input: Mapping[str, Array] = field(default_factory=dict)
+    """As `u_common`, for each input of the model: how far the model may be off by no fault of its
+    own. It counts for validation, not for how far model and experiment are apart."""
 
     def __post_init__(self) -> None:
-        arrays = [self.error, self.u_random, self.dof, *self.u_common.values()]
+        arrays = [self.error, self.u_random, self.dof]
+        arrays += [*self.u_common.values(), *self.u_input.values()]
         if self.error.ndim != 1 or self.error.size == 0:
             raise ValidateError(
                 "there is no level at which model and experiment can be compared. Take at least "
@@ -53,10 +57,22 @@ class ComparisonErrors:
             raise ValidateError("errors and uncertainties must be finite numbers.")
 
     @property
+    def u_data(self) -> Array:
+        """Standard uncertainty of the experiment at each level, (n,)."""
+        return _root_sum(self.u_random, *self.u_common.values())
+
+    @property
+    def u_simulation(self) -> Array:
+        """Standard uncertainty that the inputs leave to the model at each level, (n,)."""
+        return _root_sum(np.zeros_like(self.error), *self.u_input.values())
+
+    @property
     def u_validation(self) -> Array:
-        """Validation uncertainty u_val at each level, (n,): V&V 20 eq. (1-5-8)."""
-        parts = np.stack([self.u_random, *self.u_common.values()])
-        return np.asarray(np.hypot.reduce(parts, axis=0), dtype=np.float64)
+        """Validation uncertainty u_val at each level, (n,): V&V 20 eq. (1-5-8).
+
+        The numerical part, u_num, is not in it: finite elements are converged beforehand.
+        """
+        return _root_sum(self.u_data, self.u_simulation)
 
     def propagate(self, value: float, sensitivity: Array) -> Estimate:
         """Estimate of a result of the errors with sensitivity coefficients (n,)."""
@@ -66,6 +82,10 @@ class ComparisonErrors:
         ]
         common = [Component(name, abs(float(sensitivity @ u))) for name, u in self.u_common.items()]
         return combine(value, random + common)
+
+
+def _root_sum(*parts: Array) -> Array:
+    return np.asarray(np.hypot.reduce(np.stack(parts), axis=0), dtype=np.float64)
 
 
 def bias(errors: ComparisonErrors) -> Estimate:
@@ -83,7 +103,7 @@ def rmse(errors: ComparisonErrors) -> Estimate:
     """
     n = errors.error.size
     value = math.sqrt(float(np.mean(errors.error**2)))
-    bound = math.sqrt(float(np.mean(errors.u_validation**2)))
+    bound = math.sqrt(float(np.mean(errors.u_data**2)))
     if value <= bound:
         return Estimate(value, bound, float(errors.dof.min()))
     return errors.propagate(value, errors.error / (n * value))
@@ -180,6 +200,22 @@ def repeatability(groups: Sequence[Array]) -> Repeatability | None:
         low=math.sqrt(squares / float(chdtri(dof, 0.025))),
         high=math.sqrt(squares / float(chdtri(dof, 0.975))),
     )
+
+
+def same_variance(groups: Sequence[Array], significance: float = 0.05) -> bool:
+    """Whether groups of repeats may have one variance: Cochran's test (ISO 5725-2:2019, 8.3.3).
+
+    Its critical value from the F distribution ('t Lam 2010, eq. 3), with the mean size of a group
+    where they differ. Groups without repeats do not count; one group agrees with itself.
+    """
+    repeated = [group for group in groups if group.size > 1]
+    count = len(repeated)
+    variances = np.array([group.var(ddof=1) for group in repeated])
+    if count < 2 or not variances.sum() > 0:
+        return True
+    dof = float(np.mean([group.size - 1 for group in repeated]))
+    limit = float(fdtri(dof, (count - 1) * dof, 1 - significance / count))
+    return bool(variances.max() / variances.sum() <= 1 / (1 + (count - 1) / limit))
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,8 @@
 """Standard and expanded uncertainty after the GUM (JCGM 100:2008).
 
 Type A from repeats (4.2), type B from calibrations (4.3), combined by root sum of squares (5.1),
-expanded with Student's t at the effective degrees of freedom of Welch and Satterthwaite (G.4).
+expanded with Student's t at the effective degrees of freedom of Welch and Satterthwaite (G.4). The
+same budget propagated by random numbers is `rig.validate.monte_carlo`.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,16 +20,30 @@ from rig.validate.errors import ValidateError
 
 CONFIDENCE = 0.95
 
+Kind = Literal["A", "B"]
+Distribution = Literal["normal", "rectangular"]
+
 
 @dataclass(frozen=True)
 class Component:
-    """One contribution to a combined uncertainty, in the unit of the result."""
+    """One line of an uncertainty budget: an input quantity, and what it does to the result."""
 
     name: str
     u: float
-    """Standard uncertainty times the magnitude of its sensitivity coefficient."""
+    """Standard uncertainty of the input, in `unit`."""
     dof: float = math.inf
-    """Degrees of freedom; infinite for type B components taken as exactly known."""
+    """Degrees of freedom; infinite for an uncertainty taken as exactly known."""
+    sensitivity: float = 1.0
+    """Sensitivity coefficient: change of the result by a change of the input."""
+    unit: str = ""
+    """Of the input; empty if it is that of the result."""
+    kind: Kind = "B"
+    distribution: Distribution = "normal"
+
+    @property
+    def contribution(self) -> float:
+        """Part of the standard uncertainty of the result, in its unit: |c| u."""
+        return abs(self.sensitivity) * self.u
 
 
 @dataclass(frozen=True)
@@ -51,16 +67,16 @@ def coverage_factor(dof: float, confidence: float = CONFIDENCE) -> float:
 
 def effective_dof(components: Iterable[Component]) -> float:
     """Welch-Satterthwaite formula, GUM eq. (G.2b); infinite if all components are exact."""
-    parts = [component for component in components if component.u > 0]
-    whole = math.hypot(*(part.u for part in parts))
+    parts = [component for component in components if component.contribution > 0]
+    whole = math.hypot(*(part.contribution for part in parts))
     # In shares of the whole, so that no fourth power of a tiny uncertainty underflows.
-    loss = sum((part.u / whole) ** 4 / part.dof for part in parts)
+    loss = sum((part.contribution / whole) ** 4 / part.dof for part in parts)
     return 1.0 / loss if loss > 0 else math.inf
 
 
 def combine(value: float, components: Sequence[Component]) -> Estimate:
     """Estimate of `value` with uncorrelated `components`; GUM eqs. (10) and (G.2b)."""
-    u = math.hypot(*(component.u for component in components))
+    u = math.hypot(*(component.contribution for component in components))
     return Estimate(value, u, effective_dof(components))
 
 

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rig.plant.plant import Faults, Fixture, HiddenErrors, Plant, plant_parameters
+from rig.plant.instruments import Instruments
+from rig.plant.plant import Faults, Fixture, Plant, plant_parameters
 from rig.plant.specimen import draw_specimen
 from rig.spec.workspace import Workspace
 
@@ -67,6 +68,9 @@ def parameters(**changes: Any) -> dict[str, Any]:
         "transducer_gain": 10e3,
         "transducer_voltage_at_zero": 0.5,
         "transducer_noise": 0.0,
+        "transducer_bow": 0.0,
+        "transducer_span": 40e3,
+        "transducer_drift": 0.0,
         "adc_reference": 5.0,
         "adc_levels": 1024.0,
         "counts_per_newton": 2e5,
@@ -74,6 +78,10 @@ def parameters(**changes: Any) -> dict[str, Any]:
         "load_cell_noise_counts": 0.0,
         "load_cell_creep_share": 0.0,
         "load_cell_creep_time": 60.0,
+        "load_cell_bow": 0.0,
+        "load_cell_span": 20.0,
+        "load_cell_drift": 0.0,
+        "drift_time": 60.0,
         "load_cell_period": 0.1,
         "bad_word_probability": 0.0,
     }
@@ -286,13 +294,9 @@ def test_the_plant_has_every_imperfection_that_the_bench_states() -> None:
     assert virtual is not None
     rng = np.random.default_rng(1)
     specimen = draw_specimen(setup.actuator, setup.material, virtual.specimen, rng)
-    calibrations = setup.calibrations
-    hidden = HiddenErrors.draw(bench, calibrations.transducer, calibrations.load_cell, rng)
-    found = plant_parameters(
-        bench, calibrations.transducer, calibrations.load_cell, specimen, hidden, 12e3
-    )
-    area = np.pi * bench.syringe.inner_diameter**2 / 4
-    assert found["backlash_volume"] == pytest.approx(area * bench.lead_screw.backlash)
+    hidden = Instruments.draw(bench, virtual, rng)
+    found = plant_parameters(bench, specimen, hidden, 12e3)
+    assert found["backlash_volume"] == hidden.backlash > 0
     assert found["play_share"] == specimen.hysteresis == virtual.specimen.hysteresis > 0
     assert found["creep_share"] == specimen.creep_share == virtual.specimen.creep > 0
     assert found["creep_time"] == virtual.specimen.creep_time
@@ -300,11 +304,66 @@ def test_the_plant_has_every_imperfection_that_the_bench_states() -> None:
     assert found["leak_conductance"] * 10e3 == pytest.approx(virtual.pneumatics.leak)
     words = bench.load_cell.sample_rate * virtual.sensors.bad_word_interval
     assert found["bad_word_probability"] == pytest.approx(1 / words)
-    assert found["transducer_gain"] == pytest.approx(
-        calibrations.transducer.gain * (1 + hidden.transducer_gain)
-    )
-    grams = found["counts_per_newton"] * 9.80665e-3 / (1 + hidden.counts_per_gram)
-    assert grams == pytest.approx(calibrations.load_cell.counts_per_gram)
     noise_newton = found["load_cell_noise_counts"] / found["counts_per_newton"]
     assert noise_newton == pytest.approx(virtual.sensors.load_cell_noise * 9.80665)
-    assert min(abs(hidden.transducer_gain), abs(hidden.transducer_offset)) > 0
+    assert found["transducer_drift"] == virtual.sensors.transducer_drift > 0
+    assert found["load_cell_drift"] == pytest.approx(9.80665 * virtual.sensors.load_cell_drift)
+    assert found["drift_time"] == virtual.sensors.drift_time
+
+
+def test_true_constants_scatter_about_the_data_sheet_as_the_bench_states() -> None:
+    setup = Workspace(Path(__file__).resolve().parents[2]).setup("bellow-bending", "virtual-beam")
+    bench, virtual = setup.bench, setup.bench.virtual
+    assert virtual is not None
+    rng = np.random.default_rng(2)
+    drawn = [Instruments.draw(bench, virtual, rng) for _ in range(2000)]
+    nominal_and_spread = {
+        "transducer_gain": (10e3, 10e3 * virtual.sensors.transducer_gain),
+        "transducer_bow": (0.0, virtual.sensors.transducer_bow),
+        "voltage_at_zero": (0.5, virtual.sensors.transducer_offset / 10e3),
+        "counts_per_gram": (2000.0, 2000 * virtual.sensors.load_cell_gain),
+        "load_cell_bow": (0.0, virtual.sensors.load_cell_bow),
+        "load_cell_creep": (0.0, virtual.sensors.load_cell_creep),
+        "volume_per_step": (
+            bench.volume_per_step,
+            bench.volume_per_step * virtual.drive.volume_per_step,
+        ),
+        "dead_volume": (2e-6, 2e-6 * virtual.drive.dead_volume),
+    }
+    for name, (nominal, spread) in nominal_and_spread.items():
+        values = np.array([getattr(one, name) for one in drawn])
+        assert values.mean() == pytest.approx(nominal, abs=4 * spread / np.sqrt(2000)), name
+        assert values.std() == pytest.approx(spread, rel=0.08), name
+
+
+def test_sensors_with_a_bow_show_less_in_the_middle_and_the_same_at_both_ends() -> None:
+    bent, straight = make(transducer_bow=2e3, transducer_span=12e3), make()
+    for plant in (bent, straight):
+        push(plant, 6e-6, 4_000)
+        plant.run(3_000)
+    truth = bent.truth().gauge_pressure
+    x = truth / 12e3
+    volts = [p.run(1).adc[0] * 5 / 1024 for p in (bent, straight)]
+    assert (volts[1] - volts[0]) * 10e3 == pytest.approx(2e3 * 4 * x * (1 - x), abs=60)
+
+
+def test_masses_load_the_cell_and_a_plug_shuts_the_actuator_out() -> None:
+    plant = make()
+    plant.set_cell_load(0.5)
+    assert plant.run(200).hx711_word == pytest.approx(1000 + 0.5 * 2e5, abs=1)
+    plant.set_fixture(Fixture.PLUGGED)
+    push(plant, 6e-6, 10_000)
+    plant.run(5_000)
+    start = SYRINGE + DEAD_AND_TUBE
+    expected = AMBIENT * start / (start - plant.truth().pushed_volume) - AMBIENT
+    assert plant.truth().gauge_pressure == pytest.approx(expected, rel=1e-5)
+    assert plant.truth().actuator_pressure == pytest.approx(0.0, abs=1e-6)
+
+
+def test_zeros_drift_apart_by_as_much_as_stated() -> None:
+    changes = []
+    for seed in range(200):
+        plant = make(seed, load_cell_drift=0.01, drift_time=0.5, load_cell_zero_counts=1e5)
+        first = plant.run(101).hx711_word
+        changes.append((plant.run(5_000).hx711_word - first) / 2e5)
+    assert np.std(changes) == pytest.approx(0.01, rel=0.2)

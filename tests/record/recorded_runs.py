@@ -45,6 +45,8 @@ def point(number: int) -> PointDocument:
         value=None if number == 2 else 5.0 * number,
         value_sd=0.1,
         value_u=0.2,
+        value_parts=(),
+        pressure_parts=(),
         unit="deg",
         readings=5,
         rejected=("blurred",) if number == 2 else (),

@@ -22,6 +22,7 @@ from rig.record.documents import (
     ResumeDocument,
     StartDocument,
     StopDocument,
+    UncertaintyPart,
 )
 from rig.record.writer import RunWriter
 from rig.spec.workspace import Setup, Workspace, library_root
@@ -122,6 +123,13 @@ def _protocol(story: Story) -> str:
     return text
 
 
+def part(
+    name: str, u: float, kind: str, sensitivity: float = 1.0, dof: float | None = None
+) -> UncertaintyPart:
+    values = {"name": name, "u": u, "kind": kind, "sensitivity": sensitivity, "dof": dof}
+    return UncertaintyPart.model_validate(values | {"distribution": "normal", "unit": ""})
+
+
 class _Teller:
     """Makes up one point after another."""
 
@@ -172,6 +180,15 @@ class _Teller:
             value=value,
             value_sd=0.05,
             value_u=float(np.hypot(u, 0.05 / np.sqrt(readings))),
+            value_parts=(
+                part("readings", 0.05 / np.sqrt(readings), "A", dof=max(1, readings - 1)),
+                part("instrument", u, "B"),
+            ),
+            pressure_parts=(
+                part("readings", pressure.std(ddof=1) / np.sqrt(pressure.size), "A", dof=20),
+                part("pressure gain", 0.001, "B", sensitivity=key.target_kpa),
+                part("pressure zero", 0.005, "B"),
+            ),
             unit="deg" if key.experiment == "deformation" else "g",
             readings=readings,
             rejected=rejected,

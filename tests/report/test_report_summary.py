@@ -73,10 +73,7 @@ def test_uncertainty_holds_repeats_and_calibrations(summary: RunSummary, run_fol
     repeats = measured.std(ddof=1) / np.sqrt(3)
     load_cell = np.hypot(0.001 * measured.mean(), 0.02)
     slope = (measured.mean() - values(run_folder, "blocked_force", 7.5).mean()) / 2.5
-    transducer = library_setup().calibrations.transducer
-    pressure = slope * np.linalg.norm(
-        [transducer.zero_u / 1e3, transducer.gain_u * 10, transducer.linearity_u / 1e3]
-    )
+    pressure = slope * np.hypot(0.001 * 10, 0.005)
     u = np.linalg.norm([repeats, load_cell, pressure])
     dof = u**4 / (repeats**4 / 2)
     from scipy.stats import t
@@ -84,11 +81,64 @@ def test_uncertainty_holds_repeats_and_calibrations(summary: RunSummary, run_fol
     assert level.u95 == pytest.approx(t.ppf(0.975, dof) * u, rel=1e-3)
 
 
-def test_a_single_repeat_borrows_the_scatter_of_the_others(summary: RunSummary) -> None:
+def test_a_single_repeat_borrows_the_scatter_at_its_own_pressure(summary: RunSummary) -> None:
     points = summary.experiments["deformation"].points
-    several = np.mean([p.u95 for p in points if p.repeats > 1])
-    single = np.mean([p.u95 for p in points if p.repeats == 1])
-    assert single > several * 0.9
+    up = {p.pressure_kpa: p for p in points if p.direction == "up"}
+    single = [p for p in points if p.repeats == 1]
+    assert len(single) == 4
+    for point in single:
+        (line,) = (line for line in point.budget.lines if line.source == "repeats")
+        assert line.u == up[point.pressure_kpa].sd
+        assert line.degrees_of_freedom == 2
+
+
+def test_repeats_that_scatter_differently_are_told(summary: RunSummary, run_folder: Path) -> None:
+    found = summary.experiments["deformation"].repeatability
+    assert found is not None
+    sd = {kpa: values(run_folder, "deformation", kpa).std(ddof=1) for kpa in (0, 2.5, 5, 7.5, 10)}
+    assert found.largest == pytest.approx(max(sd.values()), rel=1e-5)
+    assert found.largest_pressure_kpa == max(sd, key=lambda kpa: sd[kpa])
+    assert found.homogeneous
+
+
+def test_the_uncertainty_of_the_models_inputs_is_in_the_validation(run_folder: Path) -> None:
+    reader, setup = RunReader(run_folder), library_setup()
+    response = predict(setup.actuator, setup.material, "beam", np.linspace(0, 10.1e3, 200))
+    loose = build_summary(reader, {"beam": response}).experiments["deformation"].models["beam"]
+    (top,) = (e for e in loose.errors if e.pressure_kpa == 10)
+    tolerances = setup.actuator.tolerances
+    assert tolerances is not None
+    bends = [
+        np.degrees(
+            predict(
+                setup.actuator.model_copy(
+                    update={
+                        "geometry": setup.actuator.geometry.model_copy(
+                            update={"wall_thickness": 1.5e-3 * (1 + wall)}
+                        )
+                    }
+                ),
+                setup.material.model_copy(
+                    update={
+                        "young_modulus": setup.material.young_modulus.model_copy(
+                            update={"value": 450e3 * (1 + modulus)}
+                        )
+                    }
+                ),
+                "beam",
+                [0.0, 10e3],
+            ).angle[-1]
+        )
+        for modulus, wall in ((0, 0), (tolerances.young_modulus, 0), (0, tolerances.wall_thickness))
+    ]
+    change = np.hypot(bends[1] - bends[0], bends[2] - bends[0])
+    assert top.u_input == pytest.approx(change, rel=0.05)
+    # finite elements obey a law of scaling instead: a stiffness more is a pressure less
+    scaled = build_summary(reader, {"fe": response}).experiments["deformation"].models["fe"]
+    (top,) = (e for e in scaled.errors if e.pressure_kpa == 10)
+    stiffer = 114.633 * tolerances.young_modulus  # the angle is proportional to the pressure here
+    assert top.u_input == pytest.approx(np.hypot(stiffer, bends[2] - bends[0]), rel=0.05)
+    assert top.u_validation > top.u_input
 
 
 def test_rmse_is_that_of_model_minus_mean(summary: RunSummary, run_folder: Path) -> None:
@@ -161,8 +211,15 @@ def test_the_paper_stands_beside_with_its_contradiction(summary: RunSummary) -> 
 
 def test_the_budget_adds_up_to_the_whole_variance(summary: RunSummary) -> None:
     for experiment in summary.experiments.values():
-        assert sum(line.share_percent for line in experiment.budget) == pytest.approx(100, abs=0.01)
-        assert {line.kind for line in experiment.budget} == {"A", "B"}
+        for level in experiment.points:
+            for budget in (level.budget, level.pressure_budget):
+                lines = budget.lines
+                assert sum(line.share_percent for line in lines) == pytest.approx(100, abs=0.01)
+                assert {line.kind for line in lines} == {"A", "B"}
+                contributions = [line.contribution for line in lines]
+                assert np.hypot.reduce(contributions) == pytest.approx(budget.u, rel=1e-4)
+                assert budget.u95 == pytest.approx(budget.coverage_factor * budget.u, rel=1e-4)
+            assert level.budget.u95 == level.u95
 
 
 def test_the_summary_survives_json(summary: RunSummary) -> None:

@@ -21,6 +21,7 @@ constexpr double kStep = 1e-3;
 constexpr double kGasConstant = 8.314462618;
 constexpr double kGamma = 1.4;
 constexpr int kConversionsPerStep = 9;  // 104 us each on a Mega
+constexpr double kDriftPeriod = 0.1;    // s between two steps of the zeros' drift
 
 double lookup(const double *table, double low, double high, double x) {
   const double position = (x - low) / (high - low) * (PLANT_TABLE - 1);
@@ -29,6 +30,24 @@ double lookup(const double *table, double low, double high, double x) {
   const double weight = clamped - index;
   return table[index] + weight * (table[index + 1] - table[index]);
 }
+
+// How much less than `value` a sensor with a bow shows: a parabola through 0 and `span`.
+double bow_at(double value, double bow, double span) {
+  const double x = value / span;
+  return bow * 4 * x * (1 - x);
+}
+
+// A zero that wanders as an Ornstein-Uhlenbeck process, stationary from the start: two values far
+// apart in time differ with the standard deviation `change`.
+struct Drift {
+  double value;
+
+  void begin(Random &random, double change) { value = change * std::sqrt(0.5) * random.normal(); }
+  void step(Random &random, double change, double correlation_time) {
+    const double kept = std::exp(-kDriftPeriod / correlation_time);
+    value = kept * value + change * std::sqrt(0.5 * (1 - kept * kept)) * random.normal();
+  }
+};
 
 struct Gas {
   double moles, temperature, volume;
@@ -54,6 +73,10 @@ struct State {
   double creep, shape_pressure;  // gauge pressures in Pa
   double held_voltage;
   double cell_creep, next_word_time;
+  double cell_load;       // N, of masses placed on the load cell
+  Random drift_random;    // of its own, so that drift leaves the noise as it is
+  Drift transducer_zero, cell_zero;
+  double next_drift_time;
   double drift;  // Pa that the transducer reads too much
   double peak_pressure, valve_opened;
   int32_t valve_open;
@@ -89,14 +112,24 @@ struct plant {
   }
 
   plant(const plant_parameters &p, const plant_response &r, uint64_t seed)
-      : par(p), response(r), now{0, Random(seed), {}, {}, 0, 0, {}, 0, 0, 0,
-                                0, 0, 0, 0, 0, 1, PLANT_FREE, {}} {
+      : par(p), response(r), now{0, Random(seed), {}, {}, 0, 0, {}, 0, 0, 0, 0, 0, 0,
+                                Random(seed ^ 0x5DEECE66Du), {}, {}, kDriftPeriod,
+                                0, 0, 0, 1, PLANT_FREE, {}} {
     now.motor_volume = now.pushed_volume = par.start_volume;
     now.syringe = at_ambient(syringe_volume());
     now.actuator = at_ambient(actuator_volume(0));
     now.held_voltage = par.transducer_voltage_at_zero;
     now.next_word_time = par.load_cell_period * (0.5 + 0.5 * now.random.uniform());
     now.cell_creep = force();
+    now.transducer_zero.begin(now.drift_random, par.transducer_drift);
+    now.cell_zero.begin(now.drift_random, par.load_cell_drift);
+  }
+
+  void wander() {
+    if (now.time < now.next_drift_time) return;
+    now.next_drift_time += kDriftPeriod;
+    now.transducer_zero.step(now.drift_random, par.transducer_drift, par.drift_time);
+    now.cell_zero.step(now.drift_random, par.load_cell_drift, par.drift_time);
   }
 
   Gas at_ambient(double volume) const {
@@ -129,7 +162,8 @@ struct plant {
     const double series = now.syringe.volume * now.actuator.volume /
                           (now.syringe.volume + now.actuator.volume);
     const double relaxation = 1.0 - std::exp(-kStep / par.heat_exchange_time);
-    const bool joined = !now.faults.tube_off && !now.faults.tube_blocked;
+    const bool joined =
+        !now.faults.tube_off && !now.faults.tube_blocked && now.fixture != PLANT_PLUGGED;
     double out_of_syringe = 0, into_actuator = 0;
     if (joined) {
       out_of_syringe = into_actuator =
@@ -176,8 +210,9 @@ struct plant {
   void read_transducer(rig_pins_in &in) {
     now.drift += now.faults.drift_rate * kStep;
     const double sign = now.faults.sensor_reversed ? -1.0 : 1.0;
-    double volts =
-        par.transducer_voltage_at_zero + sign * (gauge() + now.drift) / par.transducer_gain;
+    const double felt = gauge() - bow_at(gauge(), par.transducer_bow, par.transducer_span) +
+                        now.transducer_zero.value + now.drift;
+    double volts = par.transducer_voltage_at_zero + sign * felt / par.transducer_gain;
     if (now.faults.sensor_stuck) volts = now.held_voltage;
     now.held_voltage = volts;
     volts += now.faults.spike_voltage;
@@ -193,13 +228,14 @@ struct plant {
   }
 
   void read_load_cell(rig_pins_in &in) {
-    const double load = force();
+    const double load = force() + now.cell_load;
     now.cell_creep += (load - now.cell_creep) * (1.0 - std::exp(-kStep / par.load_cell_creep_time));
     in.hx711_ready = 0;
     if (now.time < now.next_word_time) return;
     now.next_word_time += par.load_cell_period;
     if (now.faults.hx711_silent) return;
-    const double shown = load + par.load_cell_creep_share * now.cell_creep;
+    const double shown = load - bow_at(load, par.load_cell_bow, par.load_cell_span) +
+                         par.load_cell_creep_share * now.cell_creep + now.cell_zero.value;
     const double counts = par.load_cell_zero_counts + shown * par.counts_per_newton +
                           par.load_cell_noise_counts * now.random.normal();
     int32_t word = static_cast<int32_t>(std::lround(counts));
@@ -230,6 +266,7 @@ struct plant {
     exchange_gas(out);
     deform();
     keep_score(out);
+    wander();
     read_transducer(in);
     read_load_cell(in);
     const double half_step = 0.5 * par.volume_per_step;
@@ -256,6 +293,8 @@ void plant_run(plant *p, const rig_pins_out *out, rig_pins_in *in, size_t n) {
 }
 
 void plant_set_fixture(plant *p, plant_fixture fixture) { p->now.fixture = fixture; }
+
+void plant_set_cell_load(plant *p, double force) { p->now.cell_load = force; }
 
 void plant_set_faults(plant *p, const plant_faults *faults) { p->now.faults = *faults; }
 

@@ -42,16 +42,23 @@ typedef struct {
   double response_time; /* first-order lag of shape behind pressure */
   double creep_share, creep_time;
   double play_share, play_radius[PLANT_PLAYS]; /* hysteresis: share and radii in Pa */
-  /* transducer and converter: volts = voltage_at_zero + gauge / gain */
+  /* transducer and converter: volts = voltage_at_zero + (gauge - bow 4 x (1 - x)) / gain, with
+   * x = gauge / span */
   double transducer_gain, transducer_voltage_at_zero, transducer_noise;
+  double transducer_bow, transducer_span;
+  double transducer_drift; /* Pa; standard deviation of the zero's change over a long time */
   double adc_reference, adc_levels;
   /* load cell */
   double counts_per_newton, load_cell_zero_counts, load_cell_noise_counts;
   double load_cell_creep_share, load_cell_creep_time;
+  double load_cell_bow, load_cell_span; /* N, as the transducer's */
+  double load_cell_drift;               /* N, as the transducer's */
   double load_cell_period, bad_word_probability;
+  double drift_time; /* correlation time of both zeros */
 } plant_parameters;
 
-typedef enum { PLANT_FREE = 0, PLANT_BLOCKED = 1 } plant_fixture;
+/* Plugged: the tube ends in a plug instead of the actuator. */
+typedef enum { PLANT_FREE = 0, PLANT_BLOCKED = 1, PLANT_PLUGGED = 2 } plant_fixture;
 
 /* How a limit switch misbehaves. */
 enum { PLANT_SWITCH_LIVE = 0, PLANT_SWITCH_STUCK_OPEN = 1, PLANT_SWITCH_STUCK_CLOSED = 2 };
@@ -96,6 +103,8 @@ void plant_do_step(void *p, const rig_pins_out *out, rig_pins_in *in);
 /* The same with idle pins, n times; for physics tests and settling. */
 void plant_run(plant *p, const rig_pins_out *out, rig_pins_in *in, size_t n);
 void plant_set_fixture(plant *p, plant_fixture fixture);
+/* Force in N of masses that somebody places on the load cell. */
+void plant_set_cell_load(plant *p, double force);
 void plant_set_faults(plant *p, const plant_faults *faults);
 void plant_get_truth(const plant *p, plant_truth *truth);
 size_t plant_state_size(void);
