@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from rig.spec.base import Label, SpecModel, require
 from rig.spec.hyperelastic import HyperelasticSpec
-from rig.spec.quantity import Density, Modulus, Ratio, Strength
+from rig.spec.quantity import Density, Duration, Modulus, Ratio, Strength
 
 
 class SourcedModulus(SpecModel):
@@ -58,6 +58,31 @@ class RatioRange(SpecModel):
         return self
 
 
+class RelaxationTerm(SpecModel):
+    """One term of a Prony series: a share of the instant stress that is lost, and how fast."""
+
+    weight: Ratio = Field(ge=0, lt=1, description="g")
+    time: Duration = Field(gt=0, description="tau")
+
+
+class RelaxationSpec(SpecModel):
+    """Stress under a strain that is held: s0 (1 - sum of g (1 - exp(-t / tau))).
+
+    Part of the material's record; the quasi-static models do not use it.
+    """
+
+    terms: tuple[RelaxationTerm, ...] = Field(min_length=1)
+    source: str = Field(min_length=3)
+
+    @model_validator(mode="after")
+    def _something_stays(self) -> RelaxationSpec:
+        require(
+            sum(term.weight for term in self.terms) < 1,
+            "expected the sum of 'weight' below 1: a solid keeps some of its stress",
+        )
+        return self
+
+
 class MaterialSpec(SpecModel):
     """An elastomer as the models need it."""
 
@@ -73,3 +98,4 @@ class MaterialSpec(SpecModel):
         None,
         description="energy at large strain; without it, neo-Hookean from the two constants",
     )
+    relaxation: RelaxationSpec | None = None

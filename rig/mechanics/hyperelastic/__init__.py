@@ -22,6 +22,7 @@ from rig.mechanics.hyperelastic.responses import (
 from rig.mechanics.hyperelastic.stability import (
     Stability,
     check_stability,
+    logarithmic_stiffness,
     material_stability,
 )
 from rig.mechanics.hyperelastic.volumetric import LogarithmicVolume, QuadraticVolume, abaqus_volume
@@ -50,6 +51,7 @@ __all__ = [
     "check_stability",
     "hyperelastic_from",
     "incompressible_response",
+    "logarithmic_stiffness",
     "material_stability",
     "neo_hookean_from",
     "response",

@@ -29,6 +29,7 @@ LOWEST_STRETCH, HIGHEST_STRETCH = 0.1, 10.0
 
 _POINTS = 400
 _REFINEMENTS = 4
+_ROUND_OFF = 1e-12
 _ON_CONSTANT_VOLUME = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, -1.0]])
 """The third logarithmic strain is minus the sum of the others."""
 
@@ -130,17 +131,30 @@ def _first_unstable(energy: Energy, mode: Mode, end: float) -> float | None:
     return outer
 
 
-def _is_stable(energy: Energy, mode: Mode, stretch: Array) -> NDArray[np.bool_]:
-    """Whether W is convex in the logarithmic strains at each stretch, as booleans.
+def logarithmic_stiffness(energy: Energy, mode: Mode, stretch: Array) -> Array:
+    """Hessian of W in two independent logarithmic strains at constant volume, (2, 2, n), in Pa.
 
-    The Hessian is lambda_a lambda_b A_aabb + d_ab lambda_a P_aa, seen along the two independent
-    strains. Where an energy overflows it is not stable.
+    `energy` is stable at a stretch where it is positive definite. It is
+    lambda_a lambda_b A_aabb + d_ab lambda_a P_aa, seen along the two strains, and linear in the
+    energy.
     """
     principal = principal_stretches(mode, stretch, incompressible_free_stretch(mode, stretch))
     f = diagonal(principal)
     stiffness = np.einsum("aabbn->abn", energy.tangent(f))
     hessian = principal[:, None] * principal[None, :] * stiffness
     hessian += np.eye(3)[..., None] * (principal * np.einsum("aan->an", energy.first_piola(f)))
-    d = np.einsum("ai,abn,bj->ijn", _ON_CONSTANT_VOLUME, hessian, _ON_CONSTANT_VOLUME)
-    stable: NDArray[np.bool_] = (d[0, 0] + d[1, 1] > 0) & (d[0, 0] * d[1, 1] > d[0, 1] * d[1, 0])
+    found: Array = np.einsum("ai,abn,bj->ijn", _ON_CONSTANT_VOLUME, hessian, _ON_CONSTANT_VOLUME)
+    return found
+
+
+def _is_stable(energy: Energy, mode: Mode, stretch: Array) -> NDArray[np.bool_]:
+    """Whether W is convex in the logarithmic strains; where an energy overflows it is not.
+
+    A determinant within round-off of zero counts as positive: at stretches of ten and more one
+    direction is so much stiffer than the other that the difference of its products is noise.
+    """
+    d = logarithmic_stiffness(energy, mode, stretch)
+    products = d[0, 0] * d[1, 1]
+    determinant = products - d[0, 1] * d[1, 0]
+    stable: NDArray[np.bool_] = (d[0, 0] + d[1, 1] > 0) & (determinant > -_ROUND_OFF * products)
     return stable
