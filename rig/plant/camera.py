@@ -11,13 +11,15 @@ from numpy.typing import NDArray
 from rig.mechanics.profile import side_profile
 from rig.plant.layout import ProfileFunction, lay_out
 from rig.plant.optics import draw_projection
-from rig.plant.scene import Image, Light, Scene
+from rig.plant.scene import Image, Light, Scene, Surface, linear
 from rig.spec.actuator import BellowBendingGeometry
 from rig.spec.bench import VirtualOptics
 from rig.spec.calibration import CameraCalibration, RulerCalibration
 
 _NOISE_MARGIN = 96
 _BLACK_LEVEL = 3
+_BAR = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * (0.013, 0.020)
+_BAR_COLOUR = linear(120, 120, 120)
 
 
 class CameraFault(Enum):
@@ -114,10 +116,12 @@ class VirtualCamera:
         if self.fault is CameraFault.DARK:
             shape = (self.projection.height, self.projection.width, 3)
             return self._noise.added(np.full(shape, _BLACK_LEVEL, np.uint8), time_s)
-        picture = self._scene.picture(
-            self._profile(self._geometry, angle), self.fault is CameraFault.OCCLUDED_CAP
-        )
-        return self._noise.added(picture, time_s)
+        profile = self._profile(self._geometry, angle)
+        before = []
+        if self.fault is CameraFault.OCCLUDED_CAP:
+            bar = self.layout.place(profile.end_cap).mean(axis=0) + _BAR
+            before.append(Surface(bar, _BAR_COLOUR))
+        return self._noise.added(self._scene.picture(profile, before), time_s)
 
     def grab(self, angle: float, time_s: float) -> bytes:
         """A JPEG as the camera delivers it, of the bending `angle` (rad) at `time_s` (s).

@@ -10,6 +10,7 @@ Everything that stands still is rendered once; a frame only renders the pixels a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -30,23 +31,32 @@ _BLEED = 0.0012  # metres, how far the colour of rigid parts shines into the tra
 _COARSE = 8  # shading is computed at an eighth of the resolution
 
 
-def _linear(red: int, green: int, blue: int) -> Picture:
+def linear(red: int, green: int, blue: int) -> Picture:
     """Linear light (3,) in BGR order of a colour given in grey levels."""
     levels = np.array([blue, green, red], np.float32) / np.float32(255)
     return levels * levels
 
 
-ALUMINIUM = _linear(172, 176, 180)
-RIGID_BLUE = _linear(22, 62, 190)
-BODY = _linear(214, 205, 168)
-BOTTOM_LAYER = _linear(190, 182, 146)
-MATTE_WHITE = _linear(226, 226, 222)
-MARK_BLACK = _linear(24, 24, 26)
-BACKGROUND = _linear(38, 37, 40)
-OCCLUDER = _linear(120, 120, 120)
+ALUMINIUM = linear(172, 176, 180)
+RIGID_BLUE = linear(22, 62, 190)
+BODY = linear(214, 205, 168)
+BOTTOM_LAYER = linear(190, 182, 146)
+MATTE_WHITE = linear(226, 226, 222)
+MARK_BLACK = linear(24, 24, 26)
+BACKGROUND = linear(38, 37, 40)
 
 # What a rigid part adds to the colour of a body that it shines into.
 BLEEDING = np.float32(0.6) * (RIGID_BLUE - BODY)
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A flat thing in the plane of bending."""
+
+    outline: Array
+    """(n, 2), bench metres."""
+    colour: Picture
+    """Linear light (3,), BGR."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +81,8 @@ class Light:
 class Scene:
     """Renders one bench set-up; frames differ in the actuator's profile only.
 
-    `blur` is the standard deviation of the point spread in pixels; `rng` draws the background.
+    `blur` is the standard deviation of the point spread in pixels; `rng` draws the weave of the
+    `background`, linear light (3,), before which `clutter` lies about.
     `connector` is the profile's outline of the clamped connector: it does not move.
     """
 
@@ -84,6 +95,8 @@ class Scene:
         light: Light,
         blur: float,
         rng: np.random.Generator,
+        background: Picture = BACKGROUND,
+        clutter: Sequence[Surface] = (),
     ) -> None:
         self._projection = projection
         self._layout = layout
@@ -99,33 +112,33 @@ class Scene:
             self._connector[self._connector_box.slices], self._connector_box
         )
         self._connector_light = self._connector * self._light * RIGID_BLUE[:, None, None]
-        self._ground = self._static_light(ruler, rng) * self._light
+        self._ground = self._static_light(ruler, rng, background, clutter) * self._light
         """Linear light (3, height, width) of all that stands still but the connector."""
         # Planes for one frame: fresh memory for each would cost more than the arithmetic.
         self._scratch = np.empty((6, projection.height * projection.width), np.float32)
         self._still = self._developed(self._ground * (1 - self._connector) + self._connector_light)
 
-    def picture(self, profile: SideProfile, occluded: bool = False) -> Image:
+    def picture(self, profile: SideProfile, before: Sequence[Surface] = ()) -> Image:
         """The picture (height, width, 3), BGR, 8 bit, without noise, of the deformed actuator.
 
-        `occluded` puts a grey bar before the end cap.
+        The surfaces of `before` hide what is behind them, the first one first.
         """
         place, project = self._layout.place, self._projection.project
         parts = [
             project(densified(place(outline), _OUTLINE_STEP))
             for outline in (profile.end_cap, profile.bottom_layer, profile.bellow)
         ]
-        bar = [project(_bar(place(profile.end_cap)))] if occluded else []
-        seen = bounding_box(parts + bar, self._reach, self._whole)
-        box = bounding_box(parts + bar, 2 * self._reach, self._whole)
+        hiding = [project(densified(surface.outline, _OUTLINE_STEP)) for surface in before]
+        seen = bounding_box(parts + hiding, self._reach, self._whole)
+        box = bounding_box(parts + hiding, 2 * self._reach, self._whole)
         # On one grid for all frames, so that the coarse shading does not flicker.
         box = box.on_grid(_COARSE, self._whole)
         picture = self._still.copy()
         if seen.empty:
             return picture
         light = self._actuator_light(parts, box)
-        if bar:
-            light = _over(light, OCCLUDER[:, None, None], coverage(bar[0], box))
+        for surface, outline in zip(before, hiding, strict=True):
+            light = _over(light, surface.colour[:, None, None], coverage(outline, box))
         developed = self._developed(light)
         picture[seen.slices] = developed[seen.within(box).slices]
         return picture
@@ -208,10 +221,19 @@ class Scene:
         """Coverage of an outline in bench metres."""
         return coverage(self._projection.project(densified(outline, _OUTLINE_STEP)), box)
 
-    def _static_light(self, ruler: RulerCalibration, rng: np.random.Generator) -> Picture:
-        """Linear reflectance (3, height, width) of background, frame and ruler."""
+    def _static_light(
+        self,
+        ruler: RulerCalibration,
+        rng: np.random.Generator,
+        background: Picture,
+        clutter: Sequence[Surface],
+    ) -> Picture:
+        """Linear reflectance (3, height, width) of background, clutter, frame and ruler."""
         width, height = self._projection.width, self._projection.height
-        light = BACKGROUND[:, None, None] * _cloth(width, height, rng)
+        light = background[:, None, None] * _cloth(width, height, rng)
+        for thing in clutter:
+            cover = self._cover(thing.outline, self._whole)
+            light = _over(light, thing.colour[:, None, None], cover)
         left, top, right, _ = self._projection.view()
         overhang = right - left
         edge = self._layout.frame_edge
@@ -245,13 +267,6 @@ def densified(outline: Array, step: float) -> Array:
     number = np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
     dense: Array = outline[edge] + (number / count[edge])[:, None] * edges[edge]
     return dense
-
-
-def _bar(cap: Array) -> Array:
-    """An upright bar that hides the end cap, bench metres."""
-    corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * (0.013, 0.020)
-    bar: Array = cap.mean(axis=0) + corners
-    return bar
 
 
 def _coarse(plane: Picture) -> tuple[int, int]:

@@ -46,6 +46,10 @@ class Limits:
     """Share of white pixels (250 and more) from which the exposure is wrong."""
     same_blue_share: float = 0.4
     """Blueness relative to the bluest part from which a part may be of the same material."""
+    same_hue_deg: float = 15.0
+    """Largest difference in hue to the connector of a part of the same material."""
+    max_cap_stoutness: float = 0.6
+    """Width of the cap relative to its length; more is no plate seen from its edge."""
     mounting_gap: float = 0.5
     """Gap to the connector, relative to its thickness, below which a part belongs to it."""
     speck_share: float = 0.15
@@ -243,7 +247,11 @@ class AngleMeter:
             raise UntrustedFrameError("no actuator: no blue rigid part in the frame")
         faintest = self.limits.same_blue_share * max(part.blueness for part in parts)
         connector, *others = [part for part in parts if part.blueness > faintest]
-        others = [part for part in others if not self._is_mounting(part, connector)]
+        others = [
+            part
+            for part in others
+            if self._may_be_cap(part, connector) and not self._is_mounting(part, connector)
+        ]
         others = [p for p in others if p.area_px > self.limits.speck_share * others[0].area_px]
         if not others:
             raise UntrustedFrameError(
@@ -265,6 +273,12 @@ class AngleMeter:
         if cap.touches_border:
             raise UntrustedFrameError("the end cap is cut by the border of the frame")
         return connector, cap
+
+    def _may_be_cap(self, part: BluePart, connector: BluePart) -> bool:
+        """Whether a part has the hue of the connector and the shape of a plate."""
+        apart = abs((part.hue_deg - connector.hue_deg + 180.0) % 360.0 - 180.0)
+        length, width = part.size
+        return apart < self.limits.same_hue_deg and width < self.limits.max_cap_stoutness * length
 
     def _is_mounting(self, part: BluePart, connector: BluePart) -> bool:
         """Whether a part is so close to the connector that it is what holds it."""

@@ -8,6 +8,7 @@ mirrored.
 from __future__ import annotations
 
 from cmath import phase
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 from math import degrees
@@ -21,6 +22,8 @@ from rig.vision.segment import Image, as_image
 from rig.vision.tone import to_light
 
 WHITE_LEVEL = 0.55  # of the brightest parts: between mark and paper under any usual light
+SURROUNDINGS = 0.1  # of the frame's height; wider than the ruler's mark, narrower than a reflex
+DIMMER = 8.0  # grey levels below its surroundings that noise does not make white paper
 MIN_HOLE_PX = 3.0  # diameter at search size: smaller dots have no centre worth measuring
 MAX_HOLE_SHARE = 0.1  # of the frame's height
 MIN_CIRCULARITY = 0.65  # 4 pi A / P^2 of a pixelated disc is about 0.8
@@ -29,6 +32,9 @@ MIN_CORNER_DEG, MAX_CORNER_DEG = 60.0, 120.0
 MAX_CANDIDATES = 80
 LUMA = np.array([0.114, 0.587, 0.299])  # of B, G, R: what JPEG keeps at full resolution
 PAPER = (1.25, 1.75)  # ring of white paper around a mark, in radii
+
+
+Leg = dict[int, int]  # grid place on the leg (1, 2, ...) to index of the mark
 
 
 @dataclass(frozen=True)
@@ -46,33 +52,49 @@ def find_ruler(levels: list[Image], marks: int) -> RulerMarks:
     marks are needed; of the others each leg may miss one.
     """
     search = max(len(levels) - 2, 0)  # twice the size that is enough for the blue parts
-    rough, diameters = _dark_holes(as_image(cv2.cvtColor(levels[search], cv2.COLOR_BGR2GRAY)))
-    rough = (rough + 0.5) * 2**search - 0.5
-    diameters = diameters * 2**search
-    wanted = 2 * marks + 1
-    if len(rough) < wanted - 2:
+    grey = as_image(cv2.cvtColor(levels[search], cv2.COLOR_BGR2GRAY))
+    wanted, most = 2 * marks + 1, 0
+    for bright in _bright_surfaces(grey):
+        rough, diameters = _dark_holes(grey, bright)
+        most = max(most, len(rough))
+        legs = _legs(rough, marks) if len(rough) >= wanted - 2 else None
+        if legs is not None:
+            rough = (rough + 0.5) * 2**search - 0.5
+            return _marks(levels[0], rough, diameters * 2**search, *legs)
+    if most < wanted - 2:
         raise UntrustedFrameError(
-            f"ruler not found: {len(rough)} round black marks on white where {wanted} are expected"
+            f"ruler not found: {most} round black marks on white where {wanted} are expected"
         )
-    legs = _legs(rough, marks)
-    if legs is None:
-        raise UntrustedFrameError(
-            f"ruler not found: no right angle of {marks} evenly spaced marks on each leg "
-            f"among {len(rough)} dark dots; is it hidden or another ruler?"
-        )
-    corner, first, second = legs
+    raise UntrustedFrameError(
+        f"ruler not found: no right angle of {marks} evenly spaced marks on each leg "
+        f"among {most} dark dots; is it hidden or another ruler?"
+    )
+
+
+def _marks(
+    image: Image, rough: FloatArray, diameters: FloatArray, corner: int, first: Leg, second: Leg
+) -> RulerMarks:
+    """The marks of two legs, measured."""
     indices = [corner, *first.values(), *second.values()]
     grid = [(0, 0), *((k, 0) for k in first), *((0, k) for k in second)]
     radius = 0.5 * float(np.median(diameters[indices]))
-    pixels = _centres(levels[0], rough[indices], radius)
+    pixels = _centres(image, rough[indices], radius)
     return RulerMarks(pixels=pixels, grid=np.array(grid, dtype=np.float64))
 
 
-def _dark_holes(grey: Image) -> tuple[FloatArray, FloatArray]:
-    """Centres (n, 2) and diameters (n,) in pixels of round holes in bright surfaces."""
+def _bright_surfaces(grey: Image) -> Iterator[Image]:
+    """Masks of what is white: in the whole frame, then, for uneven light, in its surroundings."""
     histogram = cv2.calcHist([grey], [0], None, [256], [0, 256]).ravel()
     brightest = int(np.searchsorted(np.cumsum(histogram), 0.995 * grey.size))
-    bright = cv2.threshold(grey, WHITE_LEVEL * brightest, 255, cv2.THRESH_BINARY)[1]
+    yield as_image(cv2.threshold(grey, WHITE_LEVEL * brightest, 255, cv2.THRESH_BINARY)[1])
+    block = 2 * round(0.5 * SURROUNDINGS * len(grey)) + 1
+    if block > 1:
+        mean = cv2.ADAPTIVE_THRESH_MEAN_C
+        yield as_image(cv2.adaptiveThreshold(grey, 255, mean, cv2.THRESH_BINARY, block, DIMMER))
+
+
+def _dark_holes(grey: Image, bright: Image) -> tuple[FloatArray, FloatArray]:
+    """Centres (n, 2) and diameters (n,) in pixels of round holes in bright surfaces."""
     contours, tree = cv2.findContours(bright, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     centres: list[tuple[float, float]] = []
     diameters: list[float] = []
@@ -92,13 +114,22 @@ def _dark_holes(grey: Image) -> tuple[FloatArray, FloatArray]:
     if not centres:
         return np.empty((0, 2)), np.empty(0)
     points, sizes = np.array(centres), np.array(diameters)
-    if len(points) > MAX_CANDIDATES:  # a texture, not a ruler: keep the dots of a common size
-        order = np.argsort(np.abs(sizes - np.median(sizes)), kind="stable")[:MAX_CANDIDATES]
+    if len(points) > MAX_CANDIDATES:  # of a texture; nothing is as black on white as the marks
+        order = np.argsort(-_depths(grey, points, sizes), kind="stable")[:MAX_CANDIDATES]
         points, sizes = points[order], sizes[order]
     return points, sizes
 
 
-Leg = dict[int, int]  # grid place on the leg (1, 2, ...) to index of the mark
+def _depths(grey: Image, points: FloatArray, sizes: FloatArray) -> FloatArray:
+    """Light (n,) that is missing in holes, against the median on a ring around each."""
+    turns = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
+    ring = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    around = points[:, None] + 0.5 * np.mean(PAPER) * sizes[:, None, None] * ring
+    columns, rows = np.rint(np.concatenate([points[:, None], around], axis=1)).astype(int).T
+    rows, columns = rows.clip(0, grey.shape[0] - 1), columns.clip(0, grey.shape[1] - 1)
+    light = to_light(grey[rows, columns].astype(np.float64))  # (9, n)
+    depths: FloatArray = np.median(light[1:], axis=0) - light[0]
+    return depths
 
 
 def _legs(points: FloatArray, marks: int) -> tuple[int, Leg, Leg] | None:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.vision.lines import FloatArray
+from rig.vision.tone import to_light
 
 Image = NDArray[np.uint8]
 Mask = NDArray[np.uint8]
@@ -39,6 +40,8 @@ class BluePart:
     window: tuple[int, int]  # left, top of the mask in the frame
     touches_border: bool
     blueness: float  # median, grey levels
+    hue_deg: float  # of the median colour
+    size: tuple[float, float]  # length and width of the smallest rectangle around it, px
     clipped_share: float  # share of its pixels with blue at the white level
 
     def contains(self, points: FloatArray) -> NDArray[np.bool_]:
@@ -121,7 +124,8 @@ def _outline(
     if not contours:
         return None
     contour = max(contours, key=cv2.contourArea)
-    area = float(cv2.contourArea(contour))
+    # a contour runs through the centres of its pixels, half a pixel inside of the part
+    area = float(cv2.contourArea(contour)) + 0.5 * cv2.arcLength(contour, True) + 1.0
     if area < MIN_AREA:
         return None
     points = contour[:, 0, :].astype(np.float64)
@@ -131,6 +135,8 @@ def _outline(
     outline = points + corner
     low, high = outline.min(axis=0), outline.max(axis=0)
     moments = cv2.moments(contour)
+    sides = sorted(cv2.minAreaRect(contour)[1])
+    inside = window[body > 0]
     return BluePart(
         outline=outline,
         area_px=area,
@@ -142,5 +148,13 @@ def _outline(
             low[0] <= 1 or low[1] <= 1 or high[0] >= frame_width - 2 or high[1] >= frame_height - 2
         ),
         blueness=level,
-        clipped_share=float((window[..., 0][body > 0] >= CLIPPED_LEVEL).mean()),
+        hue_deg=_hue(np.median(inside, axis=0)),
+        size=(sides[1] + 1.0, sides[0] + 1.0),
+        clipped_share=float((inside[:, 0] >= CLIPPED_LEVEL).mean()),
     )
+
+
+def _hue(colour: FloatArray) -> float:
+    """Hue in deg of a BGR colour; white light added to it, or taken away, does not change it."""
+    blue, green, red = to_light(colour)
+    return float(np.degrees(np.arctan2(np.sqrt(3.0) * (green - blue), 2.0 * red - green - blue)))

@@ -13,9 +13,10 @@ from scipy.ndimage import map_coordinates
 
 from rig.mechanics.profile import side_profile
 from rig.plant import scene
+from rig.plant.camera import _BAR, _BAR_COLOUR
 from rig.plant.errors import SceneError
 from rig.plant.layout import mark_centres, ruler_outline
-from rig.plant.scene import Scene, densified
+from rig.plant.scene import Scene, Surface, densified
 
 ANGLES_DEG = [-10.0, 0.0, 31.0, 64.0, 90.0, 127.0, 150.0]
 EDGE_TOLERANCE = 0.02  # pixels
@@ -216,7 +217,9 @@ def test_what_adjoins_leaves_no_gap(quiet):
 
 def test_the_grey_bar_hides_the_cap_and_nothing_else_moves(quiet):
     profile = side_profile(GEOMETRY, 0.8)
-    free, hidden = (quiet._scene.picture(profile, occluded=o) for o in (False, True))
+    bar = quiet.layout.place(profile.end_cap).mean(axis=0) + _BAR
+    free = quiet._scene.picture(profile)
+    hidden = quiet._scene.picture(profile, [Surface(bar, _BAR_COLOUR)])
     cap = quiet.projection.project(quiet.layout.place(profile.end_cap))
     columns, rows = np.rint(densified(cap, 4.0)).astype(int).T
     colours = hidden[rows, columns].astype(int)
