@@ -1,0 +1,1 @@
+"""Designed experiments on specs: designs, executors, surfaces, sensitivity, optimisation."""
