@@ -4,6 +4,8 @@
 
 #include "emulator.h"
 
+#include <dlfcn.h>
+
 #include <algorithm>
 #include <cstdarg>
 #include <cstdio>
@@ -27,6 +29,7 @@ extern "C" {
 #include "hx711_chip.h"
 #include "processor.h"
 #include "stepper_driver.h"
+#include "translation.h"
 
 namespace {
 
@@ -487,6 +490,35 @@ void rig_emulator_restart(rig_emulator *emulator, uint8_t cause, uint32_t dead_m
     emulator->dead_ms = dead_ms;
     emulator->restart_cause = cause;
   }
+}
+
+int rig_emulator_translate(const rig_emulator *emulator, const char *file) {
+  const std::string source = emulator->processor->translation();
+  std::FILE *out = std::fopen(file, "w");
+  if (out == nullptr) return 0;
+  const bool written = std::fwrite(source.data(), 1, source.size(), out) == source.size();
+  return std::fclose(out) == 0 && written;
+}
+
+int rig_emulator_use(rig_emulator *emulator, const char *library, char *problem, size_t size) {
+  // never closed: another emulator may run it, too
+  void *const opened = dlopen(library, RTLD_NOW | RTLD_LOCAL);
+  if (opened == nullptr) {
+    std::snprintf(problem, size, "%s", dlerror());
+    return 0;
+  }
+  const auto *blocks = static_cast<const rig_emulator_parts::Block *>(dlsym(opened, "rig_blocks"));
+  const auto *count = static_cast<const uint32_t *>(dlsym(opened, "rig_block_count"));
+  const auto *digest = static_cast<const uint64_t *>(dlsym(opened, "rig_digest"));
+  if (blocks == nullptr || count == nullptr || digest == nullptr) {
+    std::snprintf(problem, size, "it is no translated image");
+    return 0;
+  }
+  if (!emulator->processor->use(blocks, *count, *digest)) {
+    std::snprintf(problem, size, "it is the translation of another image");
+    return 0;
+  }
+  return 1;
 }
 
 void rig_emulator_run_plainly(rig_emulator *emulator) {

@@ -1,7 +1,8 @@
 """The Mega's own image, run cycle by cycle in libsimavr against the virtual bench.
 
 Firmware and bench advance together in C; Python sees the serial line, and what the emulator
-measured. Built on first use: see `rig.board.emulator_build`.
+measured. Built on first use: see `rig.board.emulator_build`. The shipped image is translated into
+code of this machine; any other is interpreted, which is the same to the cycle, and slower.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.board.emulator_build import emulator, firmware_image
+from rig.board.emulator_build import emulator, firmware_image, translated_image
 from rig.board.errors import BoardError
 from rig.board.simulated import BUFFER_BYTES, SimulatedBoard, SteppedBench
 
@@ -135,6 +136,14 @@ class EmulatedBoard(SimulatedBoard):
             why = self._ffi.string(problem).decode(errors="replace").strip()
             raise BoardError(f"{path} cannot be run as an image of the Mega: {why}")
         self._board = self._ffi.gc(board, self._lib.rig_emulator_free)
+        if image is None:
+            self._use(translated_image())
+
+    def _use(self, translation: Path) -> None:
+        problem = self._ffi.new("char[]", 256)
+        if not self._lib.rig_emulator_use(self._board, str(translation).encode(), problem, 256):
+            why = self._ffi.string(problem).decode(errors="replace").strip()
+            raise BoardError(f"the translated image {translation} cannot be run: {why}")
 
     def write(self, data: bytes) -> None:
         """Bytes from the host to the board; they arrive at the pace of 115200 baud."""

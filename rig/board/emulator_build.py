@@ -29,6 +29,7 @@ SOURCES = ("Makefile", "rig_mega/**/*", "emulator/*", "host/rig_host.h")
 """Of the folder firmware; what is built depends on nothing else there."""
 IMAGE = "rig_mega.elf"
 EXTENSION = "_emulator"
+TRANSLATION = "translation.so"
 
 
 def missing_packages() -> list[str]:
@@ -49,6 +50,12 @@ def missing_packages() -> list[str]:
 def firmware_image() -> Path:
     """The ELF that is flashed onto a Mega; raises BoardError if it cannot be built."""
     return _built() / IMAGE
+
+
+@lru_cache(maxsize=1)
+def translated_image() -> Path:
+    """The same image compiled for this machine; raises BoardError if it cannot be built."""
+    return _built() / TRANSLATION
 
 
 @lru_cache(maxsize=1)
@@ -103,10 +110,9 @@ def _build(sources: Path, folder: Path) -> None:
         work, done = Path(scratch, "work"), Path(scratch, "done")
         done.mkdir()
         build_image(work)
-        shutil.copy(work / IMAGE, done)
-        _build_extension(sources / "emulator" / "build_emulator.py", work)
-        for extension in work.glob(f"{EXTENSION}*.so"):
-            shutil.copy(extension, done)
+        _build_emulator(sources / "emulator" / "build_emulator.py", work)
+        for product in (work / IMAGE, work / TRANSLATION, *work.glob(f"{EXTENSION}*.so")):
+            shutil.copy(product, done)
         try:
             done.rename(folder)
         except OSError:
@@ -114,8 +120,8 @@ def _build(sources: Path, folder: Path) -> None:
                 raise
 
 
-def _build_extension(script: Path, folder: Path) -> None:
-    command = [sys.executable, str(script), str(folder)]
+def _build_emulator(script: Path, folder: Path) -> None:
+    command = [sys.executable, str(script), str(folder), str(folder / IMAGE)]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     if result.returncode != 0:
         raise BoardError(

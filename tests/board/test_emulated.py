@@ -15,6 +15,7 @@ from rig.board import emulator_build
 from rig.board.emulated import PARAMETERS_AT, PARAMETERS_SIZE, EmulatedBoard
 from rig.board.errors import BoardError
 from rig.board.virtual import VirtualBench, virtual_board
+from rig.link.bus import SlcanBus
 from rig.link.client import RigLink
 from rig.link.schema import load_schema
 from rig.plant.plant import Faults
@@ -122,20 +123,35 @@ def test_two_runs_of_the_image_are_the_same_to_the_bit(setup: Setup) -> None:
 
 @needs_packages
 def test_instructions_do_what_they_do_in_libsimavr_to_the_cycle(setup: Setup) -> None:
-    def seen(plainly: bool) -> tuple[object, ...]:
-        rig = Emulated(setup, 2)
+    def seen(image: Path | None, plainly: bool = False) -> tuple[object, ...]:
+        board = EmulatedBoard(VirtualBench(setup, 2).plant, image=image)
         if plainly:
-            rig.board.run_plainly()
-        rig.link.command("home")
-        rig.board.log_steps(100_000)
-        messages = rig.link.wait(2.0)
-        steps = rig.board.logged_steps()
-        figures = (rig.board.load_figures(), rig.board.stepper_figures())
+            board.run_plainly()
+        link = RigLink(SlcanBus(board))
+        link.open()
+        link.command("home")
+        board.log_steps(100_000)
+        messages = link.wait(2.0)
+        steps = board.logged_steps()
+        figures = (board.load_figures(), board.stepper_figures())
         return messages, steps.due.tobytes(), steps.rose.tobytes(), figures
 
-    fast = seen(plainly=False)
-    assert len(fast[1]) > 8 * 5000  # bytes: it stepped
-    assert fast == seen(plainly=True)
+    translated, interpreted = seen(None), seen(emulator_build.firmware_image())
+    assert len(translated[1]) > 8 * 5000  # bytes: it stepped
+    assert translated == interpreted == seen(None, plainly=True)
+
+
+@needs_packages
+def test_the_translation_of_another_image_is_refused(setup: Setup, tmp_path: Path) -> None:
+    image = bytearray(emulator_build.firmware_image().read_bytes())
+    image[image.index(b"V1013")] ^= 1  # a text in its flash
+    other = tmp_path / "other.elf"
+    other.write_bytes(image)
+    board = EmulatedBoard(VirtualBench(setup, 1).plant, image=other)
+    with pytest.raises(BoardError, match="translation of another image"):
+        board._use(emulator_build.translated_image())
+    with pytest.raises(BoardError, match="cannot be run"):
+        board._use(other)
 
 
 @needs_packages
