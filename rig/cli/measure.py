@@ -46,6 +46,12 @@ def measure(
     bends: Annotated[
         Bends, typer.Option(help="side to which the actuator curls in the picture")
     ] = Bends.LEFT,
+    track: Annotated[
+        bool,
+        typer.Option(
+            "--track", help="follow the cap through videos: faster, and jumps are rejected"
+        ),
+    ] = False,
 ) -> None:
     """Measure the bending angle in images and videos.
 
@@ -67,7 +73,7 @@ def measure(
     meter = _meter(camera, ruler, bends)
     if overlay is not None:
         _make_folder(overlay)
-    rows = list(_progress(_measure(files, meter, overlay), len(files)))
+    rows = list(_progress(_measure(files, meter, overlay, track), len(files)))
     _show(rows)
     if csv is not None:
         _write(csv, rows)
@@ -94,14 +100,16 @@ def _meter(camera: Path | None, ruler: Path | None, bends: Bends) -> AngleMeter:
     )
 
 
-def _measure(files: list[Path], meter: AngleMeter, overlay: Path | None) -> Iterator[Row]:
+def _measure(
+    files: list[Path], meter: AngleMeter, overlay: Path | None, track: bool
+) -> Iterator[Row]:
     """Rows of all frames; overlays are written on the way."""
     from rig.vision.overlay import draw_overlay
     from rig.vision.table import row_of, unreadable_row
 
     names = _overlay_names(files)
     for file in files:
-        for outcome in _outcomes(file, meter):
+        for outcome in _outcomes(file, meter, track):
             if isinstance(outcome, str):
                 yield unreadable_row(file, outcome)
                 continue
@@ -112,14 +120,24 @@ def _measure(files: list[Path], meter: AngleMeter, overlay: Path | None) -> Iter
             yield row_of(file, frame.index, frame.time_s, result)
 
 
-def _outcomes(file: Path, meter: AngleMeter) -> Iterator[tuple[Frame, AngleMeasurement] | str]:
+def _outcomes(
+    file: Path, meter: AngleMeter, track: bool
+) -> Iterator[tuple[Frame, AngleMeasurement] | str]:
     """Measured frames; why the file cannot be read (further), where it cannot."""
     from rig.vision.errors import VisionError
     from rig.vision.footage import read_frames
 
+    tracker = None
+    if track:
+        from rig.vision.track import AngleTracker  # imports slowly
+
+        tracker = AngleTracker(meter)
     try:
         for frame in read_frames(file):
-            yield frame, meter.measure(frame.image)
+            if tracker is None or frame.time_s is None:
+                yield frame, meter.measure(frame.image)
+            else:
+                yield frame, tracker.measure(frame.image, frame.time_s).measurement
     except VisionError as error:
         yield str(error)
 

@@ -8,14 +8,14 @@ local projection follows a light gradient and a change of surroundings along the
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.vision.lines import FloatArray, fit_line, plain_line
+from rig.vision.lines import FloatArray, fit_line, median, plain_line
 from rig.vision.segment import BluePart, Image
 from rig.vision.tone import to_light
 
@@ -47,6 +47,7 @@ WIDTH_10_90 = 2.563  # sigmas of a blurred step between 10 % and 90 %
 class Edge:
     """One straight edge of a part."""
 
+    run: FloatArray  # (n, 2) outline pixels, px in the distorted image
     start: FloatArray  # (2,) px in the distorted image, the end of the fitted stretch
     end: FloatArray
     ideal: FloatArray  # (2, 2) the same ends in undistorted pixels
@@ -72,6 +73,16 @@ def long_edges(
     straight edges are straight.
     """
     runs = straight_runs(part.outline, image.shape[1], image.shape[0])
+    return edges_along(image, part, runs, undistort)
+
+
+def edges_along(
+    image: Image,
+    part: BluePart,
+    runs: Sequence[FloatArray],
+    undistort: Callable[[FloatArray], FloatArray],
+) -> list[Edge]:
+    """Refined edges of `part` along straight runs (n, 2) of its outline, as in `long_edges`."""
     edges = (_refine(image, part, run, undistort) for run in runs)
     return [edge for edge in edges if edge is not None]
 
@@ -199,13 +210,14 @@ def _refine(
     width = _width(profile[good], depths, crossing[good])
     floor = PIXEL_FLOOR_PX * max(1.0, width / SHARP_WIDTH_PX)
     return Edge(
+        run=run,
         start=pixels[0] - fit.offsets_px[0] * _normal(fit.direction),
         end=pixels[-1] - fit.offsets_px[-1] * _normal(fit.direction),
         ideal=ideal,
         u_rad=float(np.hypot(fit.u_direction_rad, floor / length)),
         rms_px=fit.rms_px,
         width_px=width,
-        contrast=float(np.median(contrast[good])),
+        contrast=median(contrast[good]),
         length_px=length,
     )
 
@@ -219,7 +231,7 @@ def _inner_reach(part: BluePart, base: FloatArray, outward: FloatArray) -> float
     depths = np.arange(1.0, 2.0 * REACH_IN_PX + 1.0)
     grid = (base[:, None, :] - depths[None, :, None] * outward).reshape(-1, 2)
     inside = part.contains(grid).reshape(len(base), len(depths))
-    thickness = float(np.median(np.minimum.accumulate(inside, axis=1).sum(axis=1)))
+    thickness = median(np.minimum.accumulate(inside, axis=1).sum(axis=1))
     return float(np.clip(round(thickness) / 2.0, 2.0, REACH_IN_PX))
 
 
@@ -273,7 +285,7 @@ def _width(profile: FloatArray, depths: FloatArray, crossing: FloatArray) -> flo
 
     The quartiles are used because the plateaus of a thin part are short.
     """
-    shift = np.median(crossing)
+    shift = median(crossing)
     mean = profile.mean(axis=0)
     centre = int(np.argmin(np.abs(depths - shift)))
     upper = _level_depth(mean, depths, centre, 0.75, -1)

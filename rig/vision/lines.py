@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import atan2, cos, sin
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +43,7 @@ def fit_line(points: FloatArray, weights: FloatArray) -> LineFit:
     centre, direction, offsets = plain_line(points, robust)
     scale = 0.0
     for step in range(HUBER_STEPS + BISQUARE_STEPS):
-        scale = max(MAD_TO_SIGMA * _median(np.abs(offsets)), 1e-4)
+        scale = max(MAD_TO_SIGMA * median(np.abs(offsets)), 1e-4)
         if step < HUBER_STEPS:
             robust = weights / np.maximum(np.abs(offsets) / (HUBER_TUNING * scale), 1.0)
         else:
@@ -83,8 +84,9 @@ def plain_line(
     return np.array([middle_x, middle_y]), np.array([along, across]), y * along - x * across
 
 
-def _median(values: FloatArray) -> float:
-    middle = len(values) // 2  # the upper one of an even count is good enough for a scale
+def median(values: NDArray[Any]) -> float:
+    """Upper median of (n,) values: much cheaper than NumPy's, and as good for a scale."""
+    middle = len(values) // 2
     return float(np.partition(values, middle)[middle])
 
 

@@ -14,12 +14,18 @@ import cv2
 import numpy as np
 
 from rig.spec.calibration import CameraCalibration, RulerCalibration
-from rig.vision.edges import LONG_SHARE, Edge, long_edges
+from rig.vision.edges import LONG_SHARE, Edge, edges_along, long_edges
 from rig.vision.errors import UnsharpFrameError, UntrustedFrameError, VisionError
 from rig.vision.lines import FloatArray
 from rig.vision.plane import PicturePlane, rectify
 from rig.vision.ruler import find_ruler
-from rig.vision.segment import BluePart, Image, find_blue_parts, pyramid
+from rig.vision.segment import (
+    BluePart,
+    Image,
+    find_blue_parts,
+    find_blue_parts_within,
+    pyramid,
+)
 
 Side = Literal["left", "right"]
 
@@ -52,6 +58,8 @@ class Limits:
     """Width of the cap relative to its length; more is no plate seen from its edge."""
     mounting_gap: float = 0.5
     """Gap to the connector, relative to its thickness, below which a part belongs to it."""
+    mounting_share: float = 0.5
+    """Area relative to the connector's from which a part that close may be the connector."""
     speck_share: float = 0.15
     """Blue parts smaller than this share of the cap are specks."""
     min_cap_px: float = 16.0
@@ -114,6 +122,19 @@ class AngleMeasurement:
     scale_mm_per_px: float | None
     """At the actuator; None without a ruler."""
     geometry: FrameGeometry
+    sighting: Sighting | None = None
+    """For the next frame of a film; None if it was rejected, or measured in a halved frame."""
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """What a frame tells about where to look in the next one."""
+
+    plane: PicturePlane
+    connector: BluePart
+    cap: BluePart
+    connector_runs: tuple[FloatArray, ...]
+    """Outline pixels (n, 2) of its long edges."""
 
 
 @dataclass(frozen=True)
@@ -143,6 +164,29 @@ class AngleMeter:
         self._check(image_bgr)
         return self._measure(pyramid(image_bgr))
 
+    def measure_again(
+        self, image_bgr: Image, last: Sighting, move: FloatArray, margin: float
+    ) -> AngleMeasurement:
+        """Bending angle in a later frame of a film, without searching all of it.
+
+        The connector is taken to stand where `last` saw it, give or take the reach of an edge
+        profile, and the plane of the picture to be the same. The cap is sought `move` (2,) px from
+        where `last` saw it, give or take `margin`. Raises VisionError as `measure` does.
+        """
+        self._check(image_bgr)
+        frame = _Frame()
+        try:
+            box = np.reshape(last.cap.box, (2, 2)) + move
+            seen = find_blue_parts_within(image_bgr, np.stack([box[0] - margin, box[1] + margin]))
+            others = [part for part in seen if _gap(part, last.connector) > 0]
+            frame.parts = [last.connector, *others]
+            connector, cap = frame.chosen = self._choose(frame.parts)
+            edges = edges_along(image_bgr, connector, last.connector_runs, last.plane.undistort)
+            angle, u = self._turn(image_bgr, connector, cap, edges, last.plane, frame)
+        except UntrustedFrameError as why:
+            return frame.rejected(str(why))
+        return frame.accepted(self.limits, angle, u)
+
     def _measure(self, levels: list[Image]) -> AngleMeasurement:
         """The measurement in the finest level of a pyramid in which edges are sharp.
 
@@ -161,10 +205,7 @@ class AngleMeter:
             return frame.rejected(str(why))
         except UntrustedFrameError as why:
             return frame.rejected(str(why))
-        quality = frame.quality(self.limits, u)
-        return AngleMeasurement(
-            angle, u, quality, True, "", frame.scale_mm_per_px, frame.geometry()
-        )
+        return frame.accepted(self.limits, angle, u)
 
     def _halved(self) -> AngleMeter:
         """The same meter for frames of half the size."""
@@ -201,10 +242,22 @@ class AngleMeter:
         frame.parts = parts
         frame.chosen = connector, cap = self._choose(parts)
         plane = self._plane(levels, frame)
-        frame.scale_mm_per_px = plane.scale_mm_per_px(0.5 * (connector.centroid + cap.centroid))
+        edges = long_edges(levels[0], connector, plane.undistort)
+        return self._turn(levels[0], connector, cap, edges, plane, frame)
 
-        connector_edges = long_edges(levels[0], connector, plane.undistort)
-        cap_edges = long_edges(levels[0], cap, plane.undistort)
+    def _turn(
+        self,
+        image: Image,
+        connector: BluePart,
+        cap: BluePart,
+        connector_edges: list[Edge],
+        plane: PicturePlane,
+        frame: _Frame,
+    ) -> tuple[float, float]:
+        """Angle and standard uncertainty in deg between the edges of two parts."""
+        frame.plane = plane
+        frame.scale_mm_per_px = plane.scale_mm_per_px(0.5 * (connector.centroid + cap.centroid))
+        cap_edges = long_edges(image, cap, plane.undistort)
         sharpest = self._sharpest(connector_edges, cap_edges, cap)
         base = self._part_direction(connector_edges, sharpest, "connector")
         tip = self._part_direction(cap_edges, sharpest, "end cap")
@@ -250,7 +303,7 @@ class AngleMeter:
         others = [
             part
             for part in others
-            if self._may_be_cap(part, connector) and not self._is_mounting(part, connector)
+            if not self._is_mounting(part, connector) and self._may_be_cap(part, connector)
         ]
         others = [p for p in others if p.area_px > self.limits.speck_share * others[0].area_px]
         if not others:
@@ -281,11 +334,19 @@ class AngleMeter:
         return apart < self.limits.same_hue_deg and width < self.limits.max_cap_stoutness * length
 
     def _is_mounting(self, part: BluePart, connector: BluePart) -> bool:
-        """Whether a part is so close to the connector that it is what holds it."""
-        near, far = connector.box, part.box
-        gap = max(near[0] - far[2], far[0] - near[2], near[1] - far[3], far[1] - near[3])
+        """Whether a part is so close to the connector that it is what holds it.
+
+        Raises UntrustedFrameError for one that close which could be the connector itself.
+        """
+        near = connector.box
         thickness = min(near[2] - near[0], near[3] - near[1])
-        return gap < self.limits.mounting_gap * thickness
+        if _gap(part, connector) >= self.limits.mounting_gap * thickness:
+            return False
+        if part.area_px > self.limits.mounting_share * connector.area_px:
+            raise UntrustedFrameError(
+                "two blue parts could be the connector; is another blue thing in the frame?"
+            )
+        return True
 
     def _plane(self, levels: list[Image], frame: _Frame) -> PicturePlane:
         if self.ruler is None:
@@ -416,6 +477,23 @@ class _Frame:
     cap: _PartDirection | None = None
     ruler_marks: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
     scale_mm_per_px: float | None = None
+    plane: PicturePlane | None = None
+
+    def accepted(self, limits: Limits, angle: float, u: float) -> AngleMeasurement:
+        assert self.plane is not None
+        assert self.connector is not None
+        runs = tuple(edge.run for edge in self.connector.edges)
+        connector, cap = self.chosen
+        return AngleMeasurement(
+            angle,
+            u,
+            self.quality(limits, u),
+            True,
+            "",
+            self.scale_mm_per_px,
+            self.geometry(),
+            Sighting(self.plane, connector, cap, runs),
+        )
 
     def rejected(self, reason: str) -> AngleMeasurement:
         return AngleMeasurement(
@@ -447,6 +525,12 @@ class _Frame:
         return float(np.prod(np.clip(scores, 0.01, 1.0)) ** 0.25)
 
 
+def _gap(one: BluePart, other: BluePart) -> int:
+    """Pixels between the boxes around two parts; negative if they overlap."""
+    near, far = one.box, other.box
+    return max(near[0] - far[2], far[0] - near[2], near[1] - far[3], far[1] - near[3])
+
+
 def _doubled(half: AngleMeasurement) -> AngleMeasurement:
     """A measurement of a halved frame in the pixels of the whole one."""
 
@@ -462,7 +546,7 @@ def _doubled(half: AngleMeasurement) -> AngleMeasurement:
         _up(half.geometry.ruler_marks),
     )
     scale = None if half.scale_mm_per_px is None else 0.5 * half.scale_mm_per_px
-    return replace(half, geometry=geometry, scale_mm_per_px=scale)
+    return replace(half, geometry=geometry, scale_mm_per_px=scale, sighting=None)
 
 
 def _up(points: FloatArray) -> FloatArray:

@@ -7,13 +7,13 @@ grey background is zero at any brightness and the yellowish print is negative.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.vision.lines import FloatArray
+from rig.vision.lines import FloatArray, median
 from rig.vision.tone import to_light
 
 Image = NDArray[np.uint8]
@@ -85,11 +85,37 @@ def find_blue_parts(levels: list[Image]) -> list[BluePart]:
             break
         region = _padded(stats[label, :4].tolist(), small.shape)
         mine = labels[region] == label
-        level = float(np.median(coarse[region][mine]))
+        level = median(coarse[region][mine])
         part = _outline(image, mine.astype(np.uint8), region, factor, level)
         if part is not None:
             parts.append(part)
     return sorted(parts, key=lambda part: -part.area_px)
+
+
+def find_blue_parts_within(image: Image, box: FloatArray) -> list[BluePart]:
+    """Blue parts in a window of a BGR image; parts that the window cuts are cut.
+
+    `box` (2, 2) is its low and its high corner in pixels; what of it is off the frame is left out.
+    """
+    height, width = image.shape[:2]
+    left, top = np.floor(box[0]).astype(int).clip(0, [width, height])
+    right, bottom = np.ceil(box[1]).astype(int).clip(0, [width, height]) + 1
+    window = image[top:bottom, left:right]
+    if min(window.shape[:2]) < 2:
+        return []
+    return [_moved(part, (int(left), int(top))) for part in find_blue_parts([window])]
+
+
+def _moved(part: BluePart, by: tuple[int, int]) -> BluePart:
+    """A part of a window in the pixels of the frame; at the border of the one or of the other."""
+    shift = np.array(by, dtype=np.float64)
+    return replace(
+        part,
+        outline=part.outline + shift,
+        centroid=part.centroid + shift,
+        box=(part.box[0] + by[0], part.box[1] + by[1], part.box[2] + by[0], part.box[3] + by[1]),
+        window=(part.window[0] + by[0], part.window[1] + by[1]),
+    )
 
 
 def _blueness(image: Image) -> Image:
@@ -148,7 +174,7 @@ def _outline(
             low[0] <= 1 or low[1] <= 1 or high[0] >= frame_width - 2 or high[1] >= frame_height - 2
         ),
         blueness=level,
-        hue_deg=_hue(np.median(inside, axis=0)),
+        hue_deg=_hue(np.array([median(channel) for channel in inside.T], dtype=np.float64)),
         size=(sides[1] + 1.0, sides[0] + 1.0),
         clipped_share=float((inside[:, 0] >= CLIPPED_LEVEL).mean()),
     )

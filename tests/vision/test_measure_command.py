@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -41,14 +42,19 @@ def folder(tmp_path: Path, pictures: dict[float, np.ndarray]) -> Path:
     return place
 
 
-@pytest.fixture
-def video(tmp_path: Path, pictures: dict[float, np.ndarray]) -> Path:
-    path = tmp_path / "run.avi"
+def film(path: Path, pictures: Sequence[np.ndarray]) -> Path:
+    """A video of 25 frames a second."""
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 25.0, (1280, 720))
-    for picture in (pictures[10.0], np.zeros_like(pictures[10.0]), pictures[60.0]):
+    for picture in pictures:
         writer.write(picture)
     writer.release()
     return path
+
+
+@pytest.fixture
+def video(tmp_path: Path, pictures: dict[float, np.ndarray]) -> Path:
+    black = np.zeros_like(pictures[10.0])
+    return film(tmp_path / "run.avi", (pictures[10.0], black, pictures[60.0]))
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
@@ -109,6 +115,16 @@ def test_a_video_keeps_its_clock_and_its_rejected_frames(rig, video, tmp_path): 
     assert "too dark" in rows[1]["reason"]
     assert sorted(p.name for p in overlays.iterdir()) == [f"run_{k:06d}.png" for k in range(3)]
     assert cv2.imread(str(overlays / "run_000001.png")).shape == (720, 1280, 3)
+
+
+def test_a_followed_video_rejects_an_angle_that_jumps(rig, tmp_path, pictures):  # noqa: F811
+    jumping = film(tmp_path / "jump.avi", [*3 * [pictures[10.0]], pictures[60.0]])
+    table = tmp_path / "angles.csv"
+    assert rig("measure", jumping, "--track", "--csv", table).returncode == 0
+    *steady, jumped = rows_of(table)
+    assert [float(row["angle_deg"]) for row in steady] == pytest.approx(3 * [10.0], abs=1.0)
+    assert jumped["accepted"] == "false"
+    assert "the angle jumps to" in jumped["reason"]
 
 
 def test_an_image_without_actuator_exits_non_zero_with_the_reason(rig, tmp_path):  # noqa: F811
