@@ -120,7 +120,7 @@ def test_a_video_keeps_its_clock_and_its_rejected_frames(rig, video, tmp_path): 
 def test_a_followed_video_rejects_an_angle_that_jumps(rig, tmp_path, pictures):  # noqa: F811
     jumping = film(tmp_path / "jump.avi", [*3 * [pictures[10.0]], pictures[60.0]])
     table = tmp_path / "angles.csv"
-    assert rig("measure", jumping, "--track", "--csv", table).returncode == 0
+    assert rig("measure", jumping, "--track", "--csv", table).code == 0
     *steady, jumped = rows_of(table)
     assert [float(row["angle_deg"]) for row in steady] == pytest.approx(3 * [10.0], abs=1.0)
     assert jumped["accepted"] == "false"
