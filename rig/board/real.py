@@ -14,6 +14,7 @@ from rig.spec.calibration import CameraCalibration
 INSTRUCTIONS = {
     "free": "Take the load cell away, so that the actuator hangs free",
     "blocked": "Mount the load cell so that it just touches the bottom layer at the tip",
+    "plugged": "Take the actuator off and close the end of the tube with a plug",
 }
 
 
@@ -52,8 +53,8 @@ class RealBench:
             raise
         self._ask = ask
 
-    def mount(self, fixture: Literal["free", "blocked"]) -> None:
-        """Ask the person at the bench to free or block the tip."""
+    def mount(self, fixture: Literal["free", "blocked", "plugged"]) -> None:
+        """Ask the person at the bench to arrange it so."""
         self._ask(INSTRUCTIONS[fixture])
 
     def close(self) -> None:

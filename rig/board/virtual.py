@@ -32,21 +32,24 @@ from rig.spec.workspace import Setup
 
 
 @dataclass(frozen=True)
-class _Seeds:
+class Seeds:
     """A stream for every part, so that a change in one leaves the others' draws alone."""
 
     specimen: np.random.SeedSequence
     instruments: np.random.SeedSequence
     camera: np.random.SeedSequence
     noise: np.random.SeedSequence
+    references: np.random.SeedSequence
 
     @classmethod
-    def of(cls, seed: int, segment: int) -> _Seeds:
-        specimen, instruments, camera, noise = np.random.SeedSequence(seed).spawn(4)
-        return cls(specimen, instruments, camera, noise.spawn(segment + 1)[-1])
+    def of(cls, seed: int, segment: int) -> Seeds:
+        """Streams of a bench; `segment` counts how often a run was resumed."""
+        specimen, instruments, camera, noise, references = np.random.SeedSequence(seed).spawn(5)
+        return cls(specimen, instruments, camera, noise.spawn(segment + 1)[-1], references)
 
 
-def _virtual(bench: BenchSpec) -> VirtualBenchSpec:
+def virtual_part(bench: BenchSpec) -> VirtualBenchSpec:
+    """What a simulated bench hides; raises BoardError if its spec does not say."""
     if bench.virtual is None:
         raise BoardError(
             f"the bench '{bench.name}' has a simulated board but no section 'virtual', which holds "
@@ -65,12 +68,12 @@ def require_simulated(bench: BenchSpec) -> None:
         )
 
 
-def _specimen(setup: Setup, seeds: _Seeds, job: Job | None) -> Specimen:
+def _specimen(setup: Setup, seeds: Seeds, job: Job | None) -> Specimen:
     """The printed actuator that the seeds draw."""
     return draw_specimen(
         setup.actuator,
         setup.material,
-        _virtual(setup.bench).specimen,
+        virtual_part(setup.bench).specimen,
         np.random.default_rng(seeds.specimen),
         job,
     )
@@ -78,13 +81,13 @@ def _specimen(setup: Setup, seeds: _Seeds, job: Job | None) -> Specimen:
 
 def specimen_of(setup: Setup, seed: int, job: Job | None = None) -> Specimen:
     """The printed actuator of a simulated bench; `job` is how its response is computed."""
-    return _specimen(setup, _Seeds.of(seed, 0), job)
+    return _specimen(setup, Seeds.of(seed, 0), job)
 
 
-def _plant(setup: Setup, specimen: Specimen, seeds: _Seeds) -> Plant:
+def _plant(setup: Setup, specimen: Specimen, seeds: Seeds) -> Plant:
     """The simulated bench around a specimen, with the instruments that the seeds draw."""
     instruments = Instruments.draw(
-        setup.bench, _virtual(setup.bench), np.random.default_rng(seeds.instruments)
+        setup.bench, virtual_part(setup.bench), np.random.default_rng(seeds.instruments)
     )
     parameters = plant_parameters(
         setup.bench, specimen, instruments, setup.actuator.limits.pressure
@@ -97,16 +100,17 @@ def virtual_board(setup: Setup, seed: int, job: Job | None = None) -> SimulatedB
 
     `job` is how the specimen's response is computed.
     """
-    seeds = _Seeds.of(seed, 0)
-    return _board(setup.bench, _plant(setup, _specimen(setup, seeds, job), seeds))
+    seeds = Seeds.of(seed, 0)
+    return board_on(setup.bench, _plant(setup, _specimen(setup, seeds, job), seeds))
 
 
-def _board(
+def board_on(
     bench: BenchSpec,
     plant: Plant,
     start_s: float = 0.0,
     after_poll: Callable[[], None] | None = None,
 ) -> SimulatedBoard:
+    """The board that the bench spec names, wired to `plant`."""
     if isinstance(bench.board, EmulatedBoard):
         from rig.board.emulated import EmulatedBoard as Mega  # built on first use
 
@@ -159,18 +163,18 @@ class VirtualBench:
         faults: FaultScript | None = None,
         job: Job | None = None,
     ) -> None:
-        seeds = _Seeds.of(seed, segment)
+        seeds = Seeds.of(seed, segment)
         specimen = _specimen(setup, seeds, job)
         self.plant = _plant(setup, specimen, seeds)
         self._truth = TruthFile(truth_path) if truth_path is not None else None
-        self._board = _board(setup.bench, self.plant, start_s, self._write_truth)
+        self._board = board_on(setup.bench, self.plant, start_s, self._write_truth)
         self.line: FaultyLine | None = None
         if faults is not None:
             self.line = FaultyLine(self._board, self.plant, faults.faults, seed)
         self.bus = SlcanBus(self.line or self._board)
         camera = VirtualCamera(
             setup.calibrations.camera,
-            _virtual(setup.bench).optics,
+            virtual_part(setup.bench).optics,
             setup.calibrations.ruler,
             specimen.geometry,
             setup.bench.camera.jpeg_quality,
@@ -184,9 +188,9 @@ class VirtualBench:
         """The board itself, for those who break or measure it."""
         return self._board
 
-    def mount(self, fixture: Literal["free", "blocked"]) -> None:
-        """Free the tip or block it against the load cell."""
-        self.plant.set_fixture(Fixture.FREE if fixture == "free" else Fixture.BLOCKED)
+    def mount(self, fixture: Literal["free", "blocked", "plugged"]) -> None:
+        """Free the tip, block it against the load cell, or plug the tube."""
+        self.plant.set_fixture(Fixture[fixture.upper()])
 
     def _write_truth(self) -> None:
         if self._truth is not None:

@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from datetime import datetime
+from datetime import date, datetime
 from pathlib import Path
 
 from rich.console import Console
@@ -25,7 +25,11 @@ from rig.experiment.doctor import Finding, look_at_bench, look_at_machine
 from rig.experiment.errors import ExperimentError
 from rig.experiment.plan import make_plan
 from rig.experiment.run import RunOutcome, new_run, resume_run
-from rig.experiment.setup import RunRequest
+from rig.experiment.setup import (
+    RunRequest,
+    expired_calibrations,
+    require_valid_calibrations,
+)
 from rig.link.errors import LinkError
 from rig.mechanics.bellow import bending_geometry
 from rig.mechanics.profile import cavity_volume
@@ -186,13 +190,26 @@ class Session:
 
 
 def new_session(
-    actuator: Path, bench: str, protocol: str, seed: int, faults: str | None = None
+    actuator: Path,
+    bench: str,
+    protocol: str,
+    seed: int,
+    faults: str | None = None,
+    *,
+    expired: bool = False,
 ) -> Session:
-    """A session from spec files or names; raises SpecError, LimitError and, for `faults` on a
-    real bench, BoardError.
+    """A session from spec files or names; `expired` calibrations are used only if that is asked.
+
+    Raises SpecError, LimitError, ExperimentError for calibrations that have run out and, for
+    `faults` on a real bench, BoardError.
     """
     workspace = Workspace.find()
     session = _session(workspace.setup(actuator, bench, protocol), seed, workspace.logs)
+    calibrations, today = session.request.setup.calibrations, date.today()
+    if not expired:
+        require_valid_calibrations(calibrations, today)
+    elif caution := expired_calibrations(calibrations, today):
+        session = replace(session, request=replace(session.request, cautions=(caution,)))
     if faults is None:
         return session
     require_simulated(session.request.setup.bench)
@@ -206,7 +223,7 @@ def examine(actuator: str, bench: str, seed: int) -> list[Finding]:
 
     A bench that cannot be opened is a finding, too.
     """
-    session = new_session(Path(actuator), bench, "default", seed)
+    session = new_session(Path(actuator), bench, "default", seed, expired=True)
     findings = look_at_machine(session.logs)
     try:
         opened = session.open_without_log()
@@ -242,7 +259,7 @@ def _session(setup: Setup, seed: int, logs: Path) -> Session:
 
 def _require_measured_calibrations(setup: Setup) -> None:
     """Refuse a real bench with the calibrations of the virtual one: its figures would be false."""
-    named = vars(setup.calibrations).items()
+    named = setup.calibrations.by_role().items()
     simulated = [role.replace("_", " ") for role, c in named if c.provenance.simulated]
     if simulated:
         raise ExperimentError(

@@ -27,6 +27,12 @@ def characterise(
         str | None,
         typer.Option(help="Break the simulated bench: name in models/faults, or a file."),
     ] = None,
+    expired_calibrations: Annotated[
+        bool,
+        typer.Option(
+            "--expired-calibrations", help="Use calibrations past their last valid day, too."
+        ),
+    ] = False,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check and print the plan; move nothing.")
     ] = False,
@@ -44,7 +50,7 @@ def characterise(
     """
     from rig.cli._session import new_session
 
-    session = new_session(actuator, bench, protocol, seed, faults)
+    session = new_session(actuator, bench, protocol, seed, faults, expired=expired_calibrations)
     session.show_plan()
     if dry_run:
         typer.echo("Dry run: nothing was moved.")

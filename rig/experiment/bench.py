@@ -8,7 +8,8 @@ from rig.experiment.plan import Plan
 from rig.link.bus import FrameBus
 from rig.record.documents import PointDocument, PointKey
 
-Fixture = Literal["free", "blocked"]
+Fixture = Literal["free", "blocked", "plugged"]
+"""Tip free, tip against the load cell, or a plug in the tube instead of the actuator."""
 
 
 class Camera(Protocol):
@@ -33,7 +34,7 @@ class Bench(Protocol):
         ...
 
     def mount(self, fixture: Fixture) -> None:
-        """Free the tip, or block it against the load cell; on a real bench, ask a person to."""
+        """Arrange the bench as `fixture` says; on a real bench, ask a person to."""
         ...
 
     def close(self) -> None:

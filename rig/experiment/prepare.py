@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from rig.experiment.errors import ExperimentError, LimitError
@@ -13,7 +14,7 @@ from rig.link.faults import HINTS
 from rig.link.schema import load_schema
 from rig.spec.actuator import ActuatorSpec
 from rig.spec.bench import BenchSpec
-from rig.spec.calibration import TransducerCalibration
+from rig.spec.calibration import SyringeCalibration, TransducerCalibration
 from rig.spec.protocol import SweepProtocol
 
 HOMING_TIMEOUT_S = 60.0
@@ -35,7 +36,8 @@ BENCH_FIELDS: dict[str, str] = {
     "max_flow_acceleration_ml_s2": "controller.max_flow_acceleration",
     "setpoint_rate_kpa_s": "controller.setpoint_rate",
     "syringe_volume_ml": "syringe.volume",
-    "volume_per_step_ul": "syringe.inner_diameter, lead_screw.lead and stepper.microsteps",
+    "volume_per_step_ul": "syringe.inner_diameter, lead_screw.lead, stepper.microsteps and "
+    "syringe.calibration",
     "system_volume_ml": "syringe.volume, syringe.dead_volume and tubing.length",
     "ambient_pressure_kpa": "ambient.pressure",
     "transducer_gain_kpa_v": "transducer.calibration",
@@ -52,14 +54,32 @@ def board_parameters(
     actuator: ActuatorSpec,
     transducer: TransducerCalibration,
     cavity_volume: float,
+    syringe: SyringeCalibration | None = None,
 ) -> dict[str, float]:
     """Parameters to write to the board, by schema name in the unit of the name.
 
     `cavity_volume` of the actuator in m3 enters the feed-forward only.
     """
+    limit = TRIP_MARGIN * actuator.limits.pressure
+    return bench_parameters(bench, transducer, syringe, cavity_volume, limit)
+
+
+def bench_parameters(
+    bench: BenchSpec,
+    transducer: TransducerCalibration,
+    drive: SyringeCalibration | None,
+    cavity_volume: float,
+    pressure_limit: float = math.inf,
+) -> dict[str, float]:
+    """As `board_parameters`, with whatever is at the tube's end: it stands `pressure_limit` in Pa.
+
+    Without a calibration of the `drive` it is taken as drawn.
+    """
     syringe, tube = bench.syringe, bench.tubing
-    system = syringe.volume + syringe.dead_volume + tube.volume + cavity_volume
-    max_flow = min(bench.controller.max_flow, bench.stepper.max_step_rate * bench.volume_per_step)
+    dead_volume = syringe.dead_volume if drive is None else drive.dead_volume
+    per_step = bench.volume_per_step if drive is None else 1e-6 / drive.steps_per_ml
+    system = syringe.volume + dead_volume + tube.volume + cavity_volume
+    max_flow = min(bench.controller.max_flow, bench.stepper.max_step_rate * per_step)
     controller = bench.controller
     return {
         "proportional_ml_s_kpa": controller.proportional * 1e9,
@@ -70,7 +90,7 @@ def board_parameters(
         "max_flow_acceleration_ml_s2": controller.max_flow_acceleration * 1e6,
         "setpoint_rate_kpa_s": controller.setpoint_rate / 1e3,
         "syringe_volume_ml": syringe.volume * 1e6,
-        "volume_per_step_ul": bench.volume_per_step * 1e9,
+        "volume_per_step_ul": per_step * 1e9,
         "system_volume_ml": system * 1e6,
         "ambient_pressure_kpa": bench.ambient.pressure / 1e3,
         "transducer_gain_kpa_v": transducer.gain / 1e3,
@@ -79,7 +99,7 @@ def board_parameters(
         "pressure_limit_kpa": min(
             bench.safety.pressure,
             bench.transducer.pressure_high,
-            TRIP_MARGIN * actuator.limits.pressure,
+            pressure_limit,
         )
         / 1e3,
         "communication_timeout_s": bench.safety.communication_timeout,

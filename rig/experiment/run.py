@@ -162,6 +162,8 @@ def _recorded(context: RunContext, record: RunWriter, done: Collection[PointKey]
     link = context.link
     recorder = LinkRecorder(record)
     link.set_tap(recorder)
+    for caution in context.request.cautions:
+        record.event(link.now_s, "caution", {"what": caution}, "warning")
     error: RigError | None = None
     crash: BaseException | None = None
     try:

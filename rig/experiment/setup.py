@@ -4,10 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from datetime import date
 
+from rig.experiment.errors import ExperimentError
 from rig.experiment.plan import Plan
 from rig.experiment.prepare import board_parameters, require_board_takes
-from rig.spec.workspace import Setup
+from rig.spec.workspace import BenchCalibrations, Setup
+
+
+def expired_calibrations(calibrations: BenchCalibrations, today: date) -> str | None:
+    """Which calibrations have run out, in a sentence; None if all hold."""
+    expired = calibrations.expired(today)
+    if not expired:
+        return None
+    listed = ", ".join(f"{role.replace('_', ' ')} (until {day})" for role, day in expired.items())
+    return f"the calibration of {listed} has expired on {today}."
+
+
+def require_valid_calibrations(calibrations: BenchCalibrations, today: date) -> None:
+    """Raise ExperimentError if a calibration has expired; nothing has been moved yet."""
+    why = expired_calibrations(calibrations, today)
+    if why is not None:
+        raise ExperimentError(
+            f"{why} Nothing was moved. Calibrate again (`rig calibrate --help`) and name the new "
+            "file in the bench, or use it all the same with --expired-calibrations: the log and "
+            "the report will say so."
+        )
 
 
 @dataclass(frozen=True)
@@ -23,12 +45,18 @@ class RunRequest:
     """ISO date and time on a real bench; None in simulated time."""
     enclosures: Mapping[str, str] = field(default_factory=dict)
     """Texts to attach to the log besides the specs, by file name."""
+    cautions: tuple[str, ...] = ()
+    """What whoever reads the run must know of how it was begun; the log warns of it."""
 
     def board_parameters(self) -> dict[str, float]:
         """What the board is told before it moves; raises LimitError for what it would refuse."""
         setup = self.setup
         parameters = board_parameters(
-            setup.bench, setup.actuator, setup.calibrations.transducer, self.cavity_volume
+            setup.bench,
+            setup.actuator,
+            setup.calibrations.transducer,
+            self.cavity_volume,
+            setup.calibrations.syringe,
         )
         require_board_takes(parameters)
         return parameters

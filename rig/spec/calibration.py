@@ -59,7 +59,7 @@ class Fit(SpecModel):
     values: tuple[Number, ...]
     covariance: tuple[tuple[Number, ...], ...]
     residuals: tuple[Number, ...] = Field(description="measured minus fitted")
-    degrees_of_freedom: Integer = Field(ge=0)
+    degrees_of_freedom: Number = Field(ge=0, description="of the points that count as independent")
 
 
 class Evidence(SpecModel):

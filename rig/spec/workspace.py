@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from datetime import date
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -18,6 +19,7 @@ from rig.spec.calibration import (
     CameraCalibration,
     LoadCellCalibration,
     RulerCalibration,
+    SyringeCalibration,
     TransducerCalibration,
 )
 from rig.spec.consistency import pressure_beyond_material
@@ -48,7 +50,10 @@ _CALIBRATIONS: dict[str, tuple[Location, type[AnyCalibration]]] = {
     "load_cell": (("load_cell", "calibration"), LoadCellCalibration),
     "camera": (("camera", "calibration"), CameraCalibration),
     "ruler": (("camera", "ruler"), RulerCalibration),
+    "syringe": (("syringe", "calibration"), SyringeCalibration),
 }
+OPTIONAL = {"syringe"}
+"""Roles of calibrations that a bench need not name."""
 
 S = TypeVar("S", bound=BaseModel)
 
@@ -61,6 +66,21 @@ class BenchCalibrations:
     load_cell: LoadCellCalibration
     camera: CameraCalibration
     ruler: RulerCalibration
+    syringe: SyringeCalibration | None = None
+    """None if the bench names none: the drive is then as drawn."""
+
+    def by_role(self) -> dict[str, AnyCalibration]:
+        """Those that there are, by what they are of."""
+        return {role: calibration for role, calibration in vars(self).items() if calibration}
+
+    def expired(self, today: date) -> dict[str, date]:
+        """Last valid day of each calibration whose time is over, by what it is of."""
+        return {
+            role: calibration.provenance.valid_until
+            for role, calibration in self.by_role().items()
+            if calibration.provenance.valid_until is not None
+            and calibration.provenance.valid_until < today
+        }
 
 
 @dataclass(frozen=True)
@@ -73,7 +93,8 @@ class Setup:
     protocol: ProtocolSpec
     calibrations: BenchCalibrations
     sources: Mapping[str, Loaded[Any]]
-    """By role: actuator, material, bench, protocol, transducer, load_cell, camera, ruler."""
+    """By role: actuator, material, bench, protocol, transducer, load_cell, camera, ruler, and
+    syringe if the bench names a calibration of it."""
 
     def attachments(self) -> dict[str, str]:
         """File name to text, for a run to carry along; `from_attachments` reads them back."""
@@ -90,6 +111,8 @@ class Setup:
         sources: dict[str, Loaded[Any]] = {}
         for role, model in _MODELS.items():
             name = f"{role}.yaml"
+            if name not in texts and role in OPTIONAL:
+                continue
             if name not in texts:
                 problems.found.append(Problem(origin / name, "the attachment is missing"))
                 continue
@@ -110,7 +133,8 @@ _MODELS: dict[str, type[BaseModel]] = {
 
 def _assemble(sources: dict[str, Loaded[Any]]) -> Setup:
     specs = {role: source.spec for role, source in sources.items()}
-    calibrations = BenchCalibrations(**{role: specs.pop(role) for role in _CALIBRATIONS})
+    named = [role for role in _CALIBRATIONS if role in specs]
+    calibrations = BenchCalibrations(**{role: specs.pop(role) for role in named})
     return Setup(**specs, calibrations=calibrations, sources=sources)
 
 
@@ -237,6 +261,8 @@ class Workspace:
         problems = _Problems()
         found: dict[str, Loaded[Any]] = {}
         for role, (location, model) in _CALIBRATIONS.items():
+            if role in OPTIONAL and _value_at(source.spec, location) is None:
+                continue
             with problems.collected():
                 found[role] = self._referred(source, location, "calibration", model)
         problems.raise_any()
@@ -271,9 +297,7 @@ class Workspace:
         self, source: Loaded[Any], location: Location, kind: str, model: type[S]
     ) -> Loaded[S]:
         """The file that the field at `location` of `source` names; read as `model`."""
-        reference = source.spec
-        for name in location:
-            reference = getattr(reference, str(name))
+        reference = _value_at(source.spec, location)
         try:
             path = self.path(kind, reference, beside=source.path.parent)
         except SpecError as error:
@@ -281,6 +305,12 @@ class Workspace:
             message = f"{why.path}: {why.message}"
             raise SpecError([problem_at(source, location, message)]) from None
         return read(path, model)
+
+
+def _value_at(spec: Any, location: Location) -> Any:
+    for name in location:
+        spec = getattr(spec, str(name))
+    return spec
 
 
 def is_workspace(folder: Path) -> bool:

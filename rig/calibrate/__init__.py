@@ -1,0 +1,1 @@
+"""From an instrument's readings beside a reference to its calibration: fits, nothing else."""

@@ -1,0 +1,309 @@
+"""A calibration from the command line: points from the bench or a file, the fit, the dated file."""
+
+from __future__ import annotations
+
+import csv
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import date, timedelta
+from pathlib import Path
+from typing import Any, TypeVar
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from rig.board.real import INSTRUCTIONS
+from rig.board.virtual_calibration import CELSIUS, VirtualCalibrationBench
+from rig.calibrate.points import Row, read_points
+from rig.cli._interruption import catching_signals
+from rig.errors import RigError
+from rig.experiment.bench import Fixture
+from rig.experiment.calibration.procedures import Stage
+from rig.experiment.calibration.references import CalibrationBench, Idle, Standard, Taken
+from rig.experiment.calibration.session import calibrate_on
+from rig.experiment.errors import AbortedError
+from rig.experiment.prepare import bench_parameters, require_board_takes
+from rig.link.client import RigLink
+from rig.link.open import open_bus
+from rig.spec.bench import BenchSpec, SerialBoard, VirtualReferences
+from rig.spec.calibration import Environment, Provenance
+from rig.spec.calibration_file import free_path, write_calibration
+from rig.spec.loading import AnyCalibration
+from rig.spec.workspace import BenchCalibrations, Workspace
+
+T = TypeVar("T")
+Procedure = Callable[[CalibrationBench, RigLink, Taken, Stage], None]
+
+
+@dataclass(frozen=True)
+class Order:
+    """What the person asked for, besides the plan of the points."""
+
+    bench: str
+    seed: int
+    points: Path | None
+    out: Path | None
+    operator: str
+    serial_number: str
+    valid_days: int
+    reference: str | None
+    reference_u: float | None
+    temperature_c: float | None
+
+
+@dataclass(frozen=True)
+class Job:
+    """A calibration about to be done on a bench, or from points taken elsewhere."""
+
+    instrument: str
+    order: Order
+    workspace: Workspace
+    bench: BenchSpec
+    calibrations: BenchCalibrations
+    standard: Standard
+    console: Console
+
+    @property
+    def simulated(self) -> bool:
+        """Whether a simulated bench is calibrated; points from a file are real ones."""
+        return self.bench.simulated and self.order.points is None
+
+    @property
+    def temperature_c(self) -> float:
+        """Of the air, and of water."""
+        given = self.order.temperature_c
+        return self.bench.ambient.temperature - CELSIUS if given is None else given
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """What the board is told; raises LimitError for what it would refuse."""
+        cal = self.calibrations
+        parameters = bench_parameters(self.bench, cal.transducer, cal.syringe, 0.0)
+        require_board_takes(parameters)
+        return parameters
+
+    @property
+    def top_kpa(self) -> float:
+        """Highest pressure that the bench may be calibrated to: a little below where it trips."""
+        return 0.94 * min(self.bench.safety.pressure, self.bench.transducer.pressure_high) / 1e3
+
+    def rows(self, procedure: Procedure, columns: Sequence[str]) -> list[Row]:
+        """Points from the file that was given, else from the bench."""
+        if self.order.points is not None:
+            return read_points(self.order.points, columns)
+        return self._take(procedure, columns)
+
+    def _take(self, procedure: Procedure, columns: Sequence[str]) -> list[Row]:
+        parameters, rows = self.parameters, list[Row]()
+        kept = self._folder / "points" / f"{self.instrument}-{date.today()}.csv"
+        kept = _free(kept)
+
+        def taken(row: Row) -> None:
+            rows.append(row)
+            _append(kept, row, columns)
+            numbers = ", ".join(f"{name} {float(row[name]):.6g}" for name in columns)
+            self.console.print(f"  {row['kind']}: {numbers}", highlight=False)
+
+        def stage(text: str) -> None:
+            self.console.print(escape(text), style="bold")
+
+        bench = self._open()
+        try:
+            with catching_signals() as interruption:
+                calibrate_on(
+                    bench,
+                    parameters,
+                    lambda link: procedure(bench, link, taken, stage),
+                    interruption.check,
+                )
+        except RigError:
+            if rows:
+                self.console.print(
+                    f"The bench was vented. {len(rows)} points are kept in {kept}: "
+                    f"`rig calibrate {self.instrument} --points {kept}` fits what there is.",
+                    soft_wrap=True,
+                    markup=False,
+                )
+            raise
+        finally:
+            bench.close()
+        return rows
+
+    def _open(self) -> CalibrationBench:
+        if isinstance(self.bench.board, SerialBoard):
+            return RealCalibrationBench(self.bench.board, self.console)
+        return VirtualCalibrationBench(self.bench, self.order.seed)
+
+    @property
+    def _folder(self) -> Path:
+        root = Path.cwd() if self.workspace.is_library else self.workspace.root
+        return root / "calibration"
+
+    def provenance(self, method: str, instrument: str) -> Provenance:
+        """Who calibrated what, when and against what; counts from today."""
+        today = date.today()
+        ambient = self.bench.ambient.pressure if self.order.points is None else None
+        return Provenance(
+            date=today,
+            valid_until=today + timedelta(days=self.order.valid_days),
+            method=method,
+            instrument=instrument,
+            serial_number=self.order.serial_number,
+            operator=self.order.operator,
+            reference=f"{self.standard.name}, u = {100 * self.standard.u:.3g} % of reading",
+            environment=Environment(
+                temperature=self.temperature_c,
+                pressure=None if ambient is None else ambient / 1e3,
+            ),
+            simulated=self.simulated,
+        )
+
+    def finish(self, calibration: AnyCalibration, lines: Sequence[str], field: str) -> None:
+        """Write the calibration and say what it found; `field` of the bench names such files."""
+        path = self.order.out or free_path(self._folder, calibration, calibration.instrument)
+        write_calibration(calibration, path)
+        for line in lines:
+            self.console.print(escape(line), highlight=False)
+        valid = calibration.provenance.valid_until
+        self.console.print(
+            f"Written: {escape(str(path))}, valid until {valid}. Runs use it once the bench names "
+            f"it: {field}: {escape(path.stem)}",
+            soft_wrap=True,
+            highlight=False,
+        )
+
+
+def new_job(
+    instrument: str, order: Order, standard: Callable[[VirtualReferences], Standard]
+) -> Job:
+    """A job; `standard` is what a simulated bench is compared with.
+
+    Raises SpecError for a bench that cannot be read, and BadParameter where a real reference is
+    not stated.
+    """
+    workspace = Workspace.find()
+    bench = workspace.bench(order.bench)
+    calibrations = workspace.resolve_bench(bench)
+    if bench.virtual is not None and order.points is None:
+        known = standard(bench.virtual.references)
+    elif order.reference is None or order.reference_u is None:
+        raise typer.BadParameter(
+            "a real instrument needs --reference, what it is compared with, and --reference-u, "
+            "the relative standard uncertainty of its scale in per cent"
+        )
+    else:
+        known = Standard(order.reference, order.reference_u / 100)
+    return Job(instrument, order, workspace, bench, calibrations, known, Console())
+
+
+class RealCalibrationBench:
+    """A bench in the lab and a person with references beside it."""
+
+    def __init__(self, board: SerialBoard, console: Console) -> None:
+        self.bus = open_bus(board.port, board.baudrate)
+        self.references = TerminalReferences(console)
+        self._console = console
+
+    def mount(self, fixture: Fixture) -> None:
+        """Ask the person to arrange it; nothing is under pressure then."""
+        self._console.input(f"{INSTRUCTIONS[fixture]}, then press Enter. ")
+
+    def close(self) -> None:
+        """Release the port."""
+        self.bus.close()
+
+
+class TerminalReferences:
+    """A person who reads and places the references, asked on the terminal."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+
+    def gauge_kpa(self, about_kpa: float, idle: Idle) -> float:
+        """Ask for the gauge's reading; asked again until it is a number near what it must be."""
+        while True:
+            shown = self._number(f"The gauge shows, in kPa (about {about_kpa:g}, as 9.998): ", idle)
+            if abs(shown - about_kpa) <= 1 + 0.1 * about_kpa:
+                return shown
+            self._console.print(
+                f"{shown:g} kPa is far from {about_kpa:g} kPa. Is the gauge in kPa, and zeroed?"
+            )
+
+    def place(self, mass_g: float, idle: Idle) -> None:
+        """Ask for a mass."""
+        what = f"Place {mass_g:g} g on" if mass_g else "Take everything off"
+        self._answer(f"{what} the load cell, then press Enter. ", idle)
+
+    def fill(self, idle: Idle) -> None:
+        """Ask for water."""
+        self._answer(
+            "Fill syringe and tube with water without bubbles, put the end of the tube over an "
+            "empty vessel on the balance, tare the balance, then press Enter. ",
+            idle,
+        )
+
+    def water_g(self, idle: Idle) -> float:
+        """Ask for the balance's reading."""
+        return self._number("The balance shows, in g (all water so far, as 7.441): ", idle)
+
+    def _number(self, question: str, idle: Idle) -> float:
+        while True:
+            text = self._answer(question, idle).strip().replace(",", ".")
+            try:
+                return float(text)
+            except ValueError:
+                self._console.print(f"'{escape(text)}' is no number; expected one such as 9.998.")
+
+    def _answer(self, question: str, idle: Idle) -> str:
+        """A line from the terminal; a thread waits for it while `idle` keeps the board calm."""
+        answers: list[str | BaseException] = []
+
+        def ask() -> None:
+            try:
+                answers.append(self._console.input(question))
+            except BaseException as error:  # told to whoever waits, below
+                answers.append(error)
+
+        threading.Thread(target=ask, daemon=True).start()
+        while not answers:
+            idle()
+        (answer,) = answers
+        if isinstance(answer, EOFError):
+            raise AbortedError("the input ended.")
+        if isinstance(answer, BaseException):
+            raise answer
+        return answer
+
+
+def _free(path: Path) -> Path:
+    others = (path.with_stem(f"{path.stem}-{n}") for n in range(2, 10_000))
+    return next(p for p in (path, *others) if not p.exists())
+
+
+def _append(path: Path, row: Row, columns: Sequence[str]) -> None:
+    """One point, on disk as soon as it is taken."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    fresh = not path.exists()
+    with path.open("a", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        if fresh:
+            writer.writerow(("kind", *columns))
+        writer.writerow((row["kind"], *(row[name] for name in columns)))
+
+
+def numbers(text: str, what: str) -> tuple[float, ...]:
+    """`20,50,100` as numbers; raises BadParameter."""
+    try:
+        values = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise typer.BadParameter(f"'{text}' is no list of {what} such as 20,50,100") from None
+    if any(value <= 0 for value in values):
+        raise typer.BadParameter(f"{what} must be above zero; got {text}")
+    return values
+
+
+def order_of(options: dict[str, Any]) -> Order:
+    """The options that all verbs share, from a verb's own arguments."""
+    return Order(**{name: options[name] for name in Order.__dataclass_fields__})

@@ -1,0 +1,85 @@
+"""`rig calibrate syringe`: the plunger's drive by water, its dead volume by Boyle's law."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from rig.cli import _calibration_options as options
+from rig.cli.calibrate import calibrate
+
+
+@calibrate.command()
+def syringe(
+    bench: options.Bench = "virtual",
+    seed: options.Seed = 1,
+    weighings: Annotated[int, typer.Option(min=4, max=50, help="Of the water so far.")] = 6,
+    tube_u_ml: Annotated[
+        float, typer.Option(min=0, help="Standard uncertainty of the tube's volume, mL.")
+    ] = 0.05,
+    points: options.Points = None,
+    out: options.Out = None,
+    operator: options.Operator = "",
+    serial_number: options.SerialNumber = "",
+    valid_days: options.ValidDays = 365,
+    reference: options.Reference = None,
+    reference_u: options.ReferenceU = None,
+    temperature_c: options.Temperature = None,
+) -> None:
+    """Find steps per mL by weighing water, dead volume and backlash by compressing gas.
+
+    On a real bench a person fills the syringe with water, reads the balance, and plugs the empty
+    tube afterwards. Ctrl-C vents the bench and keeps the points; a table of them has the columns
+    kind (dispense, up, down), plunger_ml, pressure_kpa and water_g.
+
+    Examples:
+
+        rig calibrate syringe
+
+        rig calibrate syringe --bench mega --temperature-c 22.5 --reference "Kern PCB 350-3"
+        --reference-u 0.01
+    """
+    from rig.calibrate.syringe import COLUMNS, Surroundings, fit_syringe
+    from rig.cli._calibration import new_job, order_of
+    from rig.experiment.calibration.procedures import SyringePlan, syringe_points
+    from rig.experiment.calibration.references import Standard
+
+    job = new_job(
+        "syringe", order_of(locals()), lambda r: Standard("simulated balance", r.balance_u)
+    )
+    syringe_ml = job.bench.syringe.volume * 1e6
+    jogs = max(1, int(0.8 * syringe_ml / weighings / 1.5))
+    plan = SyringePlan(jogs, weighings, job.top_kpa)
+    rows = job.rows(
+        lambda bench, link, taken, stage: syringe_points(bench, link, plan, taken, stage),
+        COLUMNS,
+    )
+    around = Surroundings(
+        ambient_kpa=job.bench.ambient.pressure / 1e3,
+        temperature_c=job.temperature_c,
+        volume_per_step_ul=job.parameters["volume_per_step_ul"],
+        syringe_ml=syringe_ml,
+        tube_ml=job.bench.tubing.volume * 1e6,
+        tube_u_ml=tube_u_ml,
+        balance_u=job.standard.u,
+        pressure_u=job.calibrations.transducer.gain_u,
+        zero_u_kpa=job.calibrations.transducer.zero_u / 1e3,
+    )
+    fit = fit_syringe(rows, around)
+    made = fit.calibration(
+        rows,
+        job.provenance(
+            "water weighed, then gas compressed behind a plug (Boyle's law); least squares",
+            f"syringe of {syringe_ml:g} mL and its drive",
+        ),
+    )
+    job.finish(
+        made,
+        (
+            f"{made.steps_per_ml:.6g} steps per mL, u = {100 * made.steps_per_ml_u:.2g} %",
+            f"backlash {1e9 * made.backlash:.3g} uL, u = {1e9 * made.backlash_u:.2g} uL",
+            f"dead volume {1e6 * made.dead_volume:.3f} mL, u = {1e6 * made.dead_volume_u:.2g} mL",
+        ),
+        "syringe.calibration",
+    )

@@ -1,0 +1,1 @@
+"""What a bench does, and a person is asked, while an instrument is compared with a reference."""

@@ -1,0 +1,70 @@
+"""References that instruments are compared with, and the bench that they are brought to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from rig.calibrate.points import Row
+from rig.experiment.bench import Fixture
+from rig.link.bus import FrameBus
+
+Idle = Callable[[], object]
+"""To be called again and again while a person is waited for: it keeps the board's watchdog calm."""
+Taken = Callable[[Row], None]
+"""Told of every point as soon as it is taken."""
+
+
+@dataclass(frozen=True)
+class Standard:
+    """What a reference is, and how well its scale is known."""
+
+    name: str
+    u: float
+    """Relative standard uncertainty of its scale, common to all readings."""
+
+
+class References(Protocol):
+    """A reference gauge, masses and a balance beside the bench; a person on a real one.
+
+    Each method returns when that is done; meanwhile it calls `idle`.
+    """
+
+    def gauge_kpa(self, about_kpa: float, idle: Idle) -> float:
+        """What the reference gauge shows now, in kPa; about `about_kpa`."""
+        ...
+
+    def place(self, mass_g: float, idle: Idle) -> None:
+        """Have exactly this mass on the load cell, in grams; 0 takes everything off."""
+        ...
+
+    def fill(self, idle: Idle) -> None:
+        """Have the syringe filled with water and its outlet over an empty vessel on the balance."""
+        ...
+
+    def water_g(self, idle: Idle) -> float:
+        """What the balance shows now, in grams."""
+        ...
+
+
+class CalibrationBench(Protocol):
+    """A bench, opened for calibration."""
+
+    @property
+    def bus(self) -> FrameBus:
+        """The link to the board; bench time lives here."""
+        ...
+
+    @property
+    def references(self) -> References:
+        """What is beside the bench."""
+        ...
+
+    def mount(self, fixture: Fixture) -> None:
+        """Plug the tube, or free the load cell; on a real bench, ask a person to."""
+        ...
+
+    def close(self) -> None:
+        """Release everything."""
+        ...

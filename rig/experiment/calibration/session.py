@@ -1,0 +1,33 @@
+"""A calibration from greeting the board to a vented bench, whatever happens in between."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from rig.experiment.calibration.references import CalibrationBench
+from rig.experiment.prepare import make_safe, take_over, write_parameters
+from rig.link.client import RigLink
+
+Procedure = Callable[[RigLink], None]
+
+
+def calibrate_on(
+    bench: CalibrationBench,
+    parameters: Mapping[str, float],
+    procedure: Procedure,
+    interrupted: Callable[[], None] | None = None,
+) -> None:
+    """Do `procedure` on a bench whose board has `parameters`; the bench is vented in any case.
+
+    `interrupted` is asked while waiting and may raise to stop; what the procedure told of its
+    points until then stays told.
+    """
+    link = RigLink(bench.bus, interrupted=interrupted)
+    link.open()
+    take_over(link)
+    write_parameters(link, dict(parameters))
+    try:
+        procedure(link)
+    finally:
+        link.ignore_interruptions()
+        make_safe(link)

@@ -1,0 +1,145 @@
+"""`rig calibrate`: files that it writes, points that it keeps, calibrations that have run out."""
+
+from __future__ import annotations
+
+import threading
+from datetime import date, timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rig.cli._calibration import TerminalReferences
+from rig.experiment.errors import AbortedError
+from rig.spec.calibration import TransducerCalibration
+from rig.spec.loading import load_calibration
+from tests.benches import BEAM_ACTUATOR
+
+from .conftest import Command
+
+
+def test_a_transducer_is_calibrated_and_its_file_can_be_used(
+    rig: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lab = tmp_path / "lab"
+    assert rig("init", lab).code == 0
+    monkeypatch.chdir(lab)
+    outcome = rig(
+        *("calibrate", "pressure", "--bench", "virtual-beam", "--steps", "5", "--cycles", "1"),
+        *("--serial-number", "ADP5 07", "--operator", "somebody"),
+    )
+    assert outcome.code == 0, outcome.err
+    today = date.today()
+    (file,) = (lab / "calibration").glob(f"transducer-ADP5-07-{today}.yaml")
+    assert rig("check", file).code == 0
+    made = load_calibration(file)
+    assert isinstance(made, TransducerCalibration)
+    provenance = made.provenance
+    assert (provenance.date, provenance.operator) == (today, "somebody")
+    assert provenance.valid_until == today + timedelta(days=365)
+    assert provenance.simulated
+    assert "simulated gauge" in provenance.reference
+    assert provenance.environment.temperature == pytest.approx(296.15)
+    assert made.evidence is not None
+    assert len(made.evidence.rows) == 12
+    assert all(len(fit.covariance) == len(fit.parameters) for fit in made.evidence.fits)
+
+    bench = lab / "models" / "benches" / "virtual-beam.yaml"
+    text = bench.read_text()
+    assert text.count("calibration: transducer-virtual") == 1
+    bench.write_text(text.replace("transducer-virtual", file.stem))
+    characterise = ("characterise", "--actuator", BEAM_ACTUATOR, "--bench", "virtual-beam")
+    assert rig(*characterise, "--dry-run").code == 0
+
+    expired = file.read_text().replace(
+        f"valid_until: '{provenance.valid_until}'", f"valid_until: '{today - timedelta(days=1)}'"
+    )
+    file.write_text(expired.replace(f"date: '{today}'", f"date: '{today - timedelta(days=2)}'"))
+    refused = rig(*characterise, "--dry-run")
+    assert refused.code == 1
+    assert "transducer" in refused.err
+    assert "--expired-calibrations" in refused.err
+    assert rig(*characterise, "--dry-run", "--expired-calibrations").code == 0
+
+
+def test_points_taken_elsewhere_are_fitted_as_those_of_the_bench(
+    rig: Command, tmp_path: Path
+) -> None:
+    points = tmp_path / "deadweight.csv"
+    rows = ["zero,0,0.5", *(f"up,{p},{0.5 + p / 10 + 1e-5 * (p % 2)}" for p in range(1, 15))]
+    points.write_text("\n".join(["kind,reference_kpa,voltage_v", *rows]) + "\n")
+    out = tmp_path / "made.yaml"
+    command = ("calibrate", "pressure", "--bench", "mega", "--points", points, "--out", out)
+    assert "--reference-u" in rig(*command).err
+    outcome = rig(*command, "--reference", "dead-weight tester", "--reference-u", "0.01")
+    assert outcome.code == 0, outcome.err
+    made = load_calibration(out)
+    assert isinstance(made, TransducerCalibration)
+    assert made.gain == pytest.approx(10e3, rel=1e-4)
+    assert not made.provenance.simulated
+
+
+def test_an_interrupted_calibration_keeps_its_points(
+    rig: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lab = tmp_path / "lab"
+    rig("init", lab)
+    monkeypatch.chdir(lab)
+
+    def stop(self: Any, about_kpa: float, idle: Any) -> float:
+        if about_kpa > 6:
+            raise AbortedError("stopped on request.")
+        return about_kpa
+
+    monkeypatch.setattr("rig.board.virtual_calibration.VirtualReferenceSet.gauge_kpa", stop)
+    outcome = rig("calibrate", "pressure", "--bench", "virtual-beam", "--steps", "5")
+    assert outcome.code == 130
+    (kept,) = (lab / "calibration" / "points").glob("pressure-*.csv")
+    assert len(kept.read_text().splitlines()) == 1 + 3  # header, zero, 2.82 and 5.64 kPa
+    assert str(kept) in outcome.out.replace("\n", "")
+    assert list((lab / "calibration").glob("transducer-2*.yaml")) == []
+
+
+class Typist:
+    """A console whose person types these lines, each once `idle` was called."""
+
+    def __init__(self, *lines: str) -> None:
+        self._lines = list(lines)
+        self.woken = threading.Event()
+        self.said: list[str] = []
+
+    def input(self, question: str) -> str:
+        self.said.append(question)
+        assert self.woken.wait(5), "nobody kept the board alive"
+        self.woken.clear()
+        if not self._lines:
+            raise EOFError
+        return self._lines.pop(0)
+
+    def print(self, text: str) -> None:
+        self.said.append(text)
+
+
+def test_a_person_is_asked_until_the_answer_makes_sense_and_the_board_is_kept_alive() -> None:
+    typist = Typist("abc", "998", "9,98")
+    references = TerminalReferences(typist)  # type: ignore[arg-type]
+    assert references.gauge_kpa(10.0, typist.woken.set) == 9.98
+    assert any("no number" in text for text in typist.said)
+    assert any("far from 10" in text for text in typist.said)
+
+
+def test_input_that_ends_stops_the_calibration() -> None:
+    typist = Typist()
+    with pytest.raises(AbortedError):
+        TerminalReferences(typist).place(20.0, typist.woken.set)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("verb", ["pressure", "loadcell", "syringe"])
+def test_every_verb_shows_examples(rig: Command, verb: str) -> None:
+    outcome = rig("calibrate", verb, "--help")
+    assert f"rig calibrate {verb} --bench mega" in outcome.out
+
+
+def test_masses_that_are_none_are_refused(rig: Command) -> None:
+    for masses in ("10,abc", "0,10", "10,20,5000"):
+        assert rig("calibrate", "loadcell", "--masses", masses).code == 2
