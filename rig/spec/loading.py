@@ -24,6 +24,7 @@ from rig.spec.faults import FaultScript
 from rig.spec.material import MaterialSpec
 from rig.spec.protocol import ProtocolSpec
 from rig.spec.published import PublishedReference
+from rig.spec.study import StudySpec
 from rig.spec.tree import MAX_CHARACTERS, Tree, parse_tree
 
 AnyCalibration = (
@@ -40,6 +41,7 @@ AnySpec = (
     | ProtocolSpec
     | FaultScript
     | PublishedReference
+    | StudySpec
     | AnyCalibration
 )
 
@@ -50,6 +52,7 @@ KINDS: dict[str, type[BaseModel]] = {
     "protocol": ProtocolSpec,
     "faults": FaultScript,
     "published": PublishedReference,
+    "study": StudySpec,
 }
 """Model of each `kind`, but for `calibration`, which depends on its `instrument`."""
 

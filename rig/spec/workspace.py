@@ -39,6 +39,7 @@ FOLDERS: dict[str, str] = {
     "protocol": "models/protocols",
     "faults": "models/faults",
     "published": "models/published",
+    "study": "models/studies",
     "calibration": "calibration",
 }
 """Where a workspace keeps the files of each kind."""

@@ -13,6 +13,8 @@ from rig.study.factors import Array, actual, term_name
 from rig.study.surface import Surface
 
 _GRID = 41
+_FACES = 20
+"""Of a surface each way; each face is drawn on its own, so they are what pictures cost."""
 
 
 def plot_surface(path: Path, surface: Surface, points: Array) -> None:
@@ -34,7 +36,7 @@ def plot_surface(path: Path, surface: Surface, points: Array) -> None:
         flat.plot(runs[:, i], runs[:, j], "k.", ms=4)
         flat.set(xlabel=surface.factors[i].name, ylabel=surface.factors[j].name)
         solid: Any = figure.add_subplot(2, len(pairs), len(pairs) + at + 1, projection="3d")
-        solid.plot_surface(x, y, z, cmap="viridis", lw=0)
+        solid.plot_surface(x, y, z, cmap="viridis", lw=0, rcount=_FACES, ccount=_FACES)
         solid.set(
             xlabel=surface.factors[i].name,
             ylabel=surface.factors[j].name,

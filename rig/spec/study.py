@@ -1,0 +1,142 @@
+"""Study files: which fields of an actuator and its material vary, by which design, and what is
+computed at every point.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from rig.spec.base import Count, Integer, Name, Number, SpecModel, require
+from rig.spec.quantity import Pressure
+
+QuantityName = Literal["angle", "displacement", "blocked_force", "volume", "max_von_mises"]
+
+
+class StudyFactor(SpecModel):
+    """A numeric field of the actuator, or of its material, and its two levels."""
+
+    name: Name
+    field: str = Field(
+        pattern=r"^(actuator|material)(\.[a-z0-9_]+)+$",
+        description="as actuator.geometry.wall_thickness or material.hyperelastic.terms.0.mu",
+    )
+    low: Number | str = Field(description="in the unit of the field, as '3 mm'")
+    high: Number | str = Field(description="in the unit of the field, as '6 mm'")
+
+
+class BoxBehnkenDesign(SpecModel):
+    """Midpoints of the cube's edges, and its centre; three factors or more."""
+
+    kind: Literal["box-behnken"]
+    centre_points: Count = 3
+
+
+class CentralCompositeDesign(SpecModel):
+    """Corners, centre, and points on the axes: beyond the levels, or within them."""
+
+    kind: Literal["central-composite"]
+    face: Literal["circumscribed", "inscribed", "faced"] = "faced"
+    centre_points: Count = 4
+
+
+class FullFactorialDesign(SpecModel):
+    """All combinations of evenly spaced levels."""
+
+    kind: Literal["full-factorial"]
+    levels: Integer = Field(2, ge=2, le=9)
+
+
+class FractionalFactorialDesign(SpecModel):
+    """A fraction of the two-level factorial, told by generators such as 'a b c abc'."""
+
+    kind: Literal["fractional-factorial"]
+    generators: str = Field(pattern=r"^[+-]?[a-z]+( [+-]?[a-z]+)*$")
+    centre_points: Integer = Field(0, ge=0)
+
+
+class SpaceFillingDesign(SpecModel):
+    """Points of a Latin hypercube or a Sobol sequence (scrambled), between the levels."""
+
+    kind: Literal["latin-hypercube", "sobol"]
+    points: Count
+    seed: Integer = Field(0, ge=0)
+
+
+Design = Annotated[
+    BoxBehnkenDesign
+    | CentralCompositeDesign
+    | FullFactorialDesign
+    | FractionalFactorialDesign
+    | SpaceFillingDesign,
+    Field(discriminator="kind"),
+]
+
+
+class StudyResponse(SpecModel):
+    """One number of every point: a quantity of a model, or of a recorded run, at a pressure."""
+
+    name: Name
+    quantity: QuantityName
+    model: Literal["beam", "fe", "run"] = Field(
+        description="run: of the run folder that is called as the point"
+    )
+    pressure: Pressure = Field(ge=0)
+    goal: Literal["maximise", "minimise"] | None = None
+    at_least: Number | None = Field(None, description="deg, mm, g, mL or kPa")
+    at_most: Number | None = Field(None, description="deg, mm, g, mL or kPa")
+
+    @model_validator(mode="after")
+    def _limits_are_ordered(self) -> StudyResponse:
+        if self.at_least is not None and self.at_most is not None:
+            require(self.at_least < self.at_most, "expected 'at_least' below 'at_most'")
+        if self.model == "run":
+            require(
+                self.quantity in ("angle", "blocked_force"),
+                "a run measures 'angle' and 'blocked_force'",
+            )
+        return self
+
+
+class StudySpec(SpecModel):
+    """A designed experiment."""
+
+    kind: Literal["study"]
+    name: Name
+    description: str = ""
+    actuator: str = Field(description="name of a file in models/actuators, or a path")
+    runs: str | None = Field(
+        None, description="folder of the recorded runs, of responses of the model 'run'"
+    )
+    factors: tuple[StudyFactor, ...] = Field(min_length=1)
+    design: Design
+    responses: tuple[StudyResponse, ...] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _consistent(self) -> StudySpec:
+        for what in ("factors", "responses"):
+            names = [one.name for one in getattr(self, what)]
+            require(len(set(names)) == len(names), f"expected {what} of different names")
+        fields = [factor.field for factor in self.factors]
+        require(len(set(fields)) == len(fields), "expected factors of different fields")
+        if self.design.kind == "box-behnken":
+            require(len(self.factors) >= 3, "a Box-Behnken design needs three factors or more")
+        if self.design.kind == "central-composite":
+            require(len(self.factors) >= 2, "a central composite design needs two factors or more")
+        if self.design.kind == "fractional-factorial":
+            words = len(self.design.generators.split())
+            require(
+                words == len(self.factors),
+                f"'generators' has {words} words; expected one for each of the "
+                f"{len(self.factors)} factors",
+            )
+        require(
+            self.runs is not None or all(one.model != "run" for one in self.responses),
+            "expected 'runs', the folder of the recorded runs",
+        )
+        require(
+            sum(one.goal is not None for one in self.responses) <= 1,
+            "expected at most one response with a 'goal'; give the others limits",
+        )
+        return self

@@ -1,0 +1,107 @@
+"""The statistics of a finished study: one response surface a response, and the optimum."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.spec.study import FractionalFactorialDesign, FullFactorialDesign, StudySpec
+from rig.study.errors import StudyError
+from rig.study.factors import (
+    Array,
+    Factor,
+    Term,
+    interaction_terms,
+    linear_terms,
+    quadratic_terms,
+)
+from rig.study.optimum import Goal, Limit, Optimum, StationaryPoint, optimum, stationary_point
+from rig.study.run import Study
+from rig.study.surface import Surface, fit_surface
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """What the runs tell; each part may be missing, with why."""
+
+    factors: tuple[Factor, ...]
+    """In lab units."""
+    points: Array
+    """Runs that have values, in lab units, (n, k)."""
+    surfaces: dict[str, Surface]
+    stationary: dict[str, StationaryPoint]
+    best: Optimum | None
+    remarks: tuple[str, ...]
+
+
+def analyse(study: Study) -> Analysis:
+    """Surfaces in the factors' lab units; failed points are left out, which is remarked."""
+    plan = study.plan
+    factors = tuple(
+        Factor(f.name, plan.in_lab_units(f.name, f.low), plan.in_lab_units(f.name, f.high))
+        for f in plan.factors
+    )
+    sound = [(point, answer) for point, answer in study.answers if answer.values is not None]
+    points = np.array(
+        [[plan.in_lab_units(f.name, point.values[f.name]) for f in factors] for point, _ in sound]
+    ).reshape(len(sound), len(factors))
+    remarks = [f"point {p.name} is left out: {a.error}" for p, a in study.failed]
+    surfaces: dict[str, Surface] = {}
+    stationary: dict[str, StationaryPoint] = {}
+    for response in plan.spec.responses:
+        values = np.array([a.values[response.name] for _, a in sound if a.values is not None])
+        try:
+            surface = fit_surface(
+                response.name, factors, points, values, _terms(plan.spec, factors)
+            )
+        except StudyError as error:
+            remarks.append(f"{response.name} has no surface: {error}")
+            continue
+        surfaces[response.name] = surface
+        if surface.remark:
+            remarks.append(f"{response.name}: {surface.remark}")
+        remarks += [
+            f"{response.name}: the residual of point {sound[run][0].name} stands out."
+            for run in surface.diagnostics.outlying
+        ]
+        try:
+            stationary[response.name] = stationary_point(surface)
+        except StudyError as error:
+            remarks.append(str(error))
+    best = None
+    try:
+        best = _optimum(study, surfaces)
+    except StudyError as error:
+        remarks.append(str(error))
+    return Analysis(factors, points, surfaces, stationary, best, tuple(remarks))
+
+
+def _terms(spec: StudySpec, factors: tuple[Factor, ...]) -> tuple[Term, ...]:
+    """The model that the design is made for."""
+    count = len(factors)
+    match spec.design:
+        case FractionalFactorialDesign():
+            return linear_terms(count)
+        case FullFactorialDesign(levels=2):
+            return interaction_terms(count)
+        case _:
+            return quadratic_terms(count)
+
+
+def _optimum(study: Study, surfaces: dict[str, Surface]) -> Optimum | None:
+    responses = study.plan.spec.responses
+    wanted = [(one.name, one.goal) for one in responses if one.goal and one.name in surfaces]
+    if not wanted:
+        return None
+    name, goal = wanted[0]
+    limits = [
+        Limit(
+            surfaces[one.name],
+            -np.inf if one.at_least is None else one.at_least,
+            np.inf if one.at_most is None else one.at_most,
+        )
+        for one in responses
+        if one.name in surfaces and (one.at_least is not None or one.at_most is not None)
+    ]
+    return optimum(surfaces[name], Goal(goal), limits)

@@ -1,0 +1,91 @@
+"""The answer of one point: quantities of models, or of a recorded run, in field units."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rig.mechanics.job import Job
+from rig.mechanics.model import predict
+from rig.mechanics.store import FolderStore
+from rig.mechanics.table import COLUMNS, rows
+from rig.spec.study import QuantityName, StudyResponse
+from rig.study.errors import StudyError
+from rig.study.plan import Task
+
+UNITS: dict[QuantityName, str] = {
+    "angle": "deg",
+    "displacement": "mm",
+    "blocked_force": "g",
+    "volume": "ml",
+    "max_von_mises": "kpa",
+}
+"""Quantity to the unit of its responses, as the columns of `rig predict` have it."""
+_EXPERIMENTS = {"angle": "deformation", "blocked_force": "blocked_force"}
+
+
+def evaluate(task: Task) -> dict[str, float]:
+    """Response to value; raises RigError where a model or a run has none."""
+    values: dict[str, float] = {}
+    for model in dict.fromkeys(one.model for one in task.responses):
+        own = [one for one in task.responses if one.model == model]
+        values |= _of_run(task, own) if model == "run" else _of_model(task, model, own)
+    return {one.name: values[one.name] for one in task.responses}
+
+
+def _of_model(task: Task, model: str, responses: list[StudyResponse]) -> dict[str, float]:
+    pressures = sorted({one.pressure for one in responses})
+    response = predict(
+        task.actuator, task.material, model, np.array(pressures), Job(FolderStore.of_user())
+    )
+    table = rows(response)
+    values = {}
+    for one in responses:
+        at = COLUMNS.index(f"{one.quantity}_{UNITS[one.quantity]}")
+        value = table[pressures.index(one.pressure)][at]
+        if not isinstance(value, float):
+            raise StudyError(
+                f"model '{model}' gives no {one.quantity} of the family "
+                f"'{task.actuator.geometry.family}'; ask for another response."
+            )
+        if not np.isfinite(value):
+            why = "; ".join(response.shortfalls) or "the calculation did not get there"
+            raise StudyError(f"{one.name} at {one.pressure / 1e3:g} kPa: {why}")
+        values[one.name] = value
+    return values
+
+
+def _of_run(task: Task, responses: list[StudyResponse]) -> dict[str, float]:
+    assert task.runs is not None
+    summary = _summary(task.runs / task.name / "summary.json")
+    return {one.name: _measured(task.runs / task.name, summary, one) for one in responses}
+
+
+def _summary(path: Path) -> dict[str, Any]:
+    try:
+        summary = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        raise StudyError(
+            f"{path} is not there, or is no summary: take the run of this point first, as "
+            f"`rig characterise --actuator POINT.yaml --out {path.parent}`."
+        ) from None
+    if summary.get("status") != "success":
+        raise StudyError(f"{path.parent}: the run ended with status '{summary.get('status')}'.")
+    return dict(summary)
+
+
+def _measured(run: Path, summary: dict[str, Any], one: StudyResponse) -> float:
+    """Mean over the branches at the response's pressure."""
+    experiment = summary["experiments"].get(_EXPERIMENTS[one.quantity], {})
+    wanted = one.pressure / 1e3
+    found = [
+        point["mean"]
+        for point in experiment.get("points", [])
+        if abs(point["pressure_kpa"] - wanted) < 0.05
+    ]
+    if not found:
+        raise StudyError(f"{run}: {one.quantity} was not measured at {wanted:g} kPa.")
+    return float(np.mean(found))

@@ -1,0 +1,268 @@
+"""Where points are computed: in this process, in local processes, on a Dask cluster, under SLURM.
+
+One interface: `Executor.map` hands back each outcome as soon as it is there, in any order. A worker
+that dies costs the point it was at, which is tried once more; nothing else is lost. Libraries of
+linear algebra get a fixed number of threads per worker, so that workers do not fight for cores.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection, wait
+from typing import Any, Protocol
+
+from rig.errors import RigError
+from rig.study.errors import StudyError
+
+THREAD_VARIABLES = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+)
+ATTEMPTS = 2
+"""Of a point whose worker dies."""
+_GRACE_S = 5.0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one task."""
+
+    index: int
+    value: Any
+    """What the function gave; None of a failure."""
+    error: str | None
+    seconds: float
+    worker: str
+    crashed: bool = False
+    """Whether the worker died of it, or without a reason of its own: another time it may work."""
+
+
+class Executor(Protocol):
+    """Computes a function, which must be importable by its name, for all tasks."""
+
+    @property
+    def workers(self) -> int:
+        """How many tasks are computed at a time."""
+        ...
+
+    def map(self, function: Callable[[Any], Any], tasks: Sequence[Any]) -> Iterator[Outcome]:
+        """Outcomes as they come; closing the iterator stops what is left."""
+        ...
+
+
+@dataclass(frozen=True)
+class InProcess:
+    """One after the other, here."""
+
+    workers: int = 1
+
+    def map(self, function: Callable[[Any], Any], tasks: Sequence[Any]) -> Iterator[Outcome]:
+        """Outcomes in order."""
+        for index, task in enumerate(tasks):
+            value, error, seconds = timed(function, task)
+            yield Outcome(index, value, error, seconds, "here")
+
+
+@dataclass(frozen=True)
+class LocalProcesses:
+    """Processes of their own on this machine."""
+
+    workers: int
+    threads: int = 1
+
+    def map(self, function: Callable[[Any], Any], tasks: Sequence[Any]) -> Iterator[Outcome]:
+        """Outcomes as they come; a task whose process dies is tried in another one."""
+        waiting = deque((index, 1) for index in range(len(tasks)))
+        busy: list[_Worker] = []
+        idle: list[_Worker] = []
+        try:
+            while waiting or busy:
+                while waiting and len(busy) < self.workers:
+                    worker = idle.pop() if idle else _Worker.started(function, self.threads)
+                    worker.give(*waiting.popleft(), tasks)
+                    busy.append(worker)
+                ready = wait([w.pipe for w in busy] + [w.process.sentinel for w in busy])
+                for worker in list(busy):
+                    if worker.pipe not in ready and worker.process.sentinel not in ready:
+                        continue
+                    busy.remove(worker)
+                    outcome = worker.outcome()
+                    if not outcome.crashed:
+                        idle.append(worker)
+                    elif worker.attempt < ATTEMPTS:
+                        waiting.appendleft((worker.index, worker.attempt + 1))
+                        continue
+                    yield outcome
+        finally:
+            for worker in busy + idle:
+                worker.stop()
+
+
+@dataclass
+class _Worker:
+    """A process that computes one task at a time."""
+
+    process: Any
+    pipe: Connection
+    index: int = -1
+    attempt: int = 0
+    began: float = field(default=0.0)
+
+    @classmethod
+    def started(cls, function: Callable[[Any], Any], threads: int) -> _Worker:
+        context = multiprocessing.get_context("spawn")
+        ours, theirs = context.Pipe()
+        process = context.Process(target=_serve, args=(theirs, function), daemon=True)
+        with _thread_variables(threads):
+            process.start()
+        theirs.close()
+        return cls(process, ours)
+
+    def give(self, index: int, attempt: int, tasks: Sequence[Any]) -> None:
+        self.index, self.attempt, self.began = index, attempt, time.monotonic()
+        try:
+            self.pipe.send(tasks[index])
+        except (BrokenPipeError, ConnectionResetError):
+            return  # it died while it was idle: `outcome` finds the closed pipe
+
+    def outcome(self) -> Outcome:
+        name = f"process {self.process.pid}"
+        try:
+            value, error, seconds = self.pipe.recv()
+            return Outcome(self.index, value, error, seconds, name)
+        except (EOFError, ConnectionResetError):
+            self.process.join(_GRACE_S)
+            why = f"the worker died (exit status {self.process.exitcode})"
+            seconds = time.monotonic() - self.began
+            return Outcome(self.index, None, why, seconds, name, crashed=True)
+
+    def stop(self) -> None:
+        self.pipe.close()
+        self.process.terminate()
+        self.process.join(_GRACE_S)
+        if self.process.is_alive():
+            self.process.kill()
+
+
+def _serve(pipe: Connection, function: Callable[[Any], Any]) -> None:
+    """What a worker does until nobody asks any more."""
+    try:
+        while True:
+            pipe.send(timed(function, pipe.recv()))
+    except (EOFError, BrokenPipeError, ConnectionResetError, KeyboardInterrupt):
+        return
+
+
+def timed(function: Callable[[Any], Any], task: Any) -> tuple[Any, str | None, float]:
+    """Value or error of a task, and the seconds that it took."""
+    began = time.monotonic()
+    try:
+        value, error = function(task), None
+    except RigError as problem:
+        value, error = None, str(problem)
+    except Exception as defect:  # one point must not cost the others
+        value, error = None, f"defect: {type(defect).__name__}: {defect}"
+    return value, error, time.monotonic() - began
+
+
+@contextmanager
+def _thread_variables(threads: int) -> Iterator[None]:
+    """The environment that a process inherits at its start."""
+    before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
+    os.environ.update(dict.fromkeys(THREAD_VARIABLES, str(threads)))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+@dataclass(frozen=True)
+class DaskCluster:
+    """A Dask cluster that `start` makes; a worker that dies is replaced by the cluster."""
+
+    start: Callable[[], Any]
+    """Makes the cluster (dask.distributed's or dask-jobqueue's), to be closed by its `close`."""
+    workers: int
+
+    def map(self, function: Callable[[Any], Any], tasks: Sequence[Any]) -> Iterator[Outcome]:
+        """Outcomes as they come; tasks of workers that died are given to others by the scheduler,
+        three times at most."""
+        distributed = _cluster_package("dask.distributed")
+        with self.start() as cluster, distributed.Client(cluster) as client:
+            futures = {
+                client.submit(timed, function, task, pure=False): index
+                for index, task in enumerate(tasks)
+            }
+            for future in distributed.as_completed(futures):
+                if future.status == "finished":
+                    value, error, seconds = future.result()
+                    yield Outcome(futures[future], value, error, seconds, "dask")
+                else:
+                    problem = future.exception()
+                    why = f"the worker died: {type(problem).__name__}"
+                    yield Outcome(futures[future], None, why, 0.0, "dask", crashed=True)
+
+
+def local_dask(workers: int, threads: int = 1) -> DaskCluster:
+    """Dask's own processes on this machine; raises StudyError without the extra `cluster`."""
+
+    def start() -> Any:
+        distributed = _cluster_package("dask.distributed")
+        with _thread_variables(threads):
+            return distributed.LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                dashboard_address=None,
+                host="127.0.0.1",
+            )
+
+    return DaskCluster(start, workers)
+
+
+def slurm(workers: int, threads: int = 1, **options: Any) -> DaskCluster:
+    """Jobs of SLURM, one worker each; `options` go to dask_jobqueue.SLURMCluster.
+
+    Raises StudyError without the extra `cluster`, when it starts.
+    """
+
+    def start() -> Any:
+        jobqueue = _cluster_package("dask_jobqueue")
+        exports = [f"export {name}={threads}" for name in THREAD_VARIABLES]
+        settings = {"cores": 1, "processes": 1, "memory": "2GB", **options}
+        prologue = [*exports, *settings.pop("job_script_prologue", [])]
+        scheduler = {"dashboard": False, **settings.pop("scheduler_options", {})}
+        cluster = jobqueue.SLURMCluster(
+            job_script_prologue=prologue,
+            scheduler_options=scheduler,
+            job_cpu=threads,
+            **settings,
+        )
+        cluster.adapt(minimum=workers, maximum=workers)  # replaces jobs that end
+        return cluster
+
+    return DaskCluster(start, workers)
+
+
+def _cluster_package(name: str) -> Any:
+    import importlib
+
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        raise StudyError(
+            f"{name} is not installed; install rig with its extra 'cluster', or take the executor "
+            f"'local'."
+        ) from None
