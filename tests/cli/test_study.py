@@ -8,7 +8,6 @@ from pathlib import Path
 from .conftest import Command
 from .test_bad_input import assert_explained
 
-
 STUDY = """\
 kind: study
 name: two
