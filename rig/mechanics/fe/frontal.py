@@ -101,10 +101,12 @@ class MultifrontalFactor:
         """x with A x = `right`, (n,) or (n, k), refined once if round-off calls for it."""
         columns = right.reshape(len(right), -1)
         x = self._solve(columns)
-        residual = columns - self._matrix @ x
-        worst = np.linalg.norm(residual) / max(float(np.linalg.norm(columns)), 1e-300)
-        if worst > _REFINE:
-            x = x + self._solve(residual)
+        # all columns at the size of the first in one product: the factors are the same for all
+        size = np.linalg.norm(columns, axis=0)
+        weights = 1 / np.where(size > 0, size, 1.0)
+        residual = columns @ weights - self._matrix @ (x @ weights)
+        if np.linalg.norm(residual) > _REFINE * np.sqrt(len(size)):
+            x = x + self._solve(columns - self._matrix @ x)
         return x.reshape(right.shape)
 
     def _solve(self, columns: Array) -> Array:

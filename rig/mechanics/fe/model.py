@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from rig.mechanics.fe.coordinates import Cartesian, Coordinates, Placement, blend
 from rig.mechanics.fe.discretisation import Discretisation, Integers
 from rig.mechanics.fe.errors import FiniteElementError
 from rig.mechanics.fe.pattern import Pattern
 from rig.mechanics.fe.pressure import PressureSurface
 from rig.mechanics.fe.rigid import RigidBody
+from rig.mechanics.fe.rotation import rotation_matrix, rotation_vector
 from rig.mechanics.fe.solid import Evaluation, Solid
 from rig.mechanics.fe.state import Pose, State
 
@@ -96,8 +98,10 @@ class Model:
         dead_load: Array | None = None,
         bodies: Sequence[RigidBody] = (),
         items: Sequence[Item] = (),
+        coordinates: Coordinates | None = None,
     ) -> None:
         """`dead_load` in N over all degrees of freedom, as `gravity` and `traction` give it.
+        `coordinates` are those that steps go straight in, Cartesian ones unless told.
 
         Raises FiniteElementError where a degree of freedom is in two rigid bodies, or no material
         is there for some element.
@@ -107,6 +111,7 @@ class Model:
         self.surface = surface
         self.bodies = tuple(bodies)
         self.items = tuple(items)
+        self.coordinates: Coordinates = coordinates or Cartesian()
         n = discretisation.size
         self.size = n
         self._pressure_volume = _pressure_volume(discretisation)
@@ -129,6 +134,7 @@ class Model:
         held[tied] = False
         self._motion[tied] = 0.0
         self.held = np.flatnonzero(held)
+        self.tied = tied
         free = ~held
         free[tied] = False
         self.free = np.flatnonzero(free)
@@ -242,17 +248,28 @@ class Model:
             body.moved(pose, length * freedoms[part])
             for body, pose, part in zip(self.bodies, state.poses, self._body_slices, strict=True)
         )
-        moved = replace(state, x=state.x + length * dx, points=points, poses=poses)
-        return self.with_bodies_in_place(moved)
+        x, poses = self.coordinates.moved(state, length * dx, poses)
+        held = state.x[self.held] + length * dx[self.held]
+        return replace(state, x=self._constrained(x, poses, held), points=points, poses=poses)
 
-    def with_bodies_in_place(self, state: State) -> State:
-        """The state with the nodes of rigid bodies where the poses say."""
-        if not self.bodies:
-            return state
-        x = state.x.copy()
-        for body, pose in zip(self.bodies, state.poses, strict=True):
+    def blended(self, states: Sequence[State], weights: Array, motion: float) -> Placement:
+        """Displacements and poses of a weighted sum of states, supports moved by `motion`.
+
+        Rotations are blended as they differ from that of the last state; the weights sum to one.
+        """
+        poses = tuple(
+            _blended_pose(parts, weights) for parts in zip(*(s.poses for s in states), strict=True)
+        )
+        x, poses = self.coordinates.blended(states, weights, poses)
+        return self._constrained(x, poses, self.prescribed(motion)), poses
+
+    def _constrained(self, x: Array, poses: tuple[Pose, ...], held: Array) -> Array:
+        """`x` with supports and the nodes of rigid bodies where they must be."""
+        x = x.copy()
+        x[self.held] = held
+        for body, pose in zip(self.bodies, poses, strict=True):
             x[body.dofs] = body.displacements(pose)
-        return replace(state, x=x)
+        return x
 
 
 def _pressure_volume(d: Discretisation) -> Array:
@@ -264,6 +281,12 @@ def _pressure_volume(d: Discretisation) -> Array:
         d.pressure_connectivity.reshape(-1), parts.reshape(-1), minlength=d.pressure_nodes
     ).astype(np.float64)
     return total
+
+
+def _blended_pose(poses: Sequence[Pose], weights: Array) -> Pose:
+    last = poses[-1].rotation
+    spin = blend(weights, [rotation_vector(p.rotation @ last.T) for p in poses])
+    return Pose(blend(weights, [p.shift for p in poses]), rotation_matrix(spin) @ last)
 
 
 def _no_dofs() -> Integers:

@@ -21,8 +21,11 @@ from rig.mechanics.fe.model import Assembly, Model
 from rig.mechanics.fe.state import State
 
 Array = NDArray[np.float64]
-_LENIENT = 1e-4
+_LENIENT = 2e-5
 """Largest residual that may pass for equilibrium."""
+_ARRIVING = 2e-3
+"""A correction below this part of the largest displacement may be the last: the tangent behind it
+is computed only when it turns out to be needed."""
 Clock = Callable[[], float]
 
 
@@ -33,16 +36,21 @@ class Options:
     tolerance: float = 1e-7
     """Residual over the size of the element forces that balance in it."""
     correction: float = 1e-6
-    """A residual up to 1e-4 is good enough as well where the next correction would be below this
+    """A residual up to 2e-5 is good enough as well where the next correction would be below this
     part of the largest displacement; 0 insists on the residual."""
     iterations: int = 14
     """Iterations before a step counts as failed."""
     mixed_points: bool = True
     """Independent strain and stress at the quadrature points during the iterations."""
+    alternate: bool = True
+    """Try a step that failed with mixed points without them before it is cut."""
     line_search: bool = True
     """Without mixed points: shorten steps that overshoot equilibrium."""
     least_step: float = 1 / 256
     """Smallest part of the way between two reported points before giving up."""
+    first_step: float = 1.0
+    """Part of the way to the next reported point that the first step along a path tries, which has
+    no others to be extrapolated from."""
     extrapolate: bool = True
     """Start each step from where the last ones point to."""
 
@@ -144,6 +152,8 @@ def solve_step(
         if len(record) >= options.iterations:
             reason = f"no equilibrium after {options.iterations} iterations"
             break
+        if assembly.data is None:
+            assembly = timer.assemble(model, state)
         begin = clock()
         try:
             step = _newton_direction(model, state, assembly, target, control, miss, solver)
@@ -152,8 +162,11 @@ def solve_step(
             break
         finally:
             timer.solve += clock() - begin
-        length, state_next, assembly_next = _search(model, state, assembly, step, options, timer)
         correction = float(np.abs(step.dx).max()) if step.dx.size else 0.0
+        arriving = correction <= _ARRIVING * float(np.abs(state.x).max(initial=0.0))
+        length, state_next, assembly_next = _search(
+            model, state, assembly, step, options, timer, tangent=not arriving
+        )
         record.append(Iteration(residual, control_error, assembly.gap, correction, length))
         if state_next is None or assembly_next is None:
             reason = "elements turn inside out"
@@ -227,7 +240,8 @@ def _newton_direction(
         driving = driving + matrix @ known
     directions = model.body_directions(state)
     columns = [-driving[free]]
-    coupled = matrix @ directions if n_q else np.zeros((model.size, 0))
+    # only the bodies' own nodes follow them
+    coupled = matrix[:, model.tied] @ directions[model.tied]
     columns.extend(coupled[free].T)
     if slope is not None:
         columns.append(assembly.pressure_slope[free])
@@ -280,6 +294,7 @@ def _search(
     step: _Step,
     options: Options,
     timer: _Timer,
+    tangent: bool,
 ) -> tuple[float, State | None, Assembly | None]:
     """The state after the step, shortened while elements are inverted or, searching, overshot."""
     searching = options.line_search and not options.mixed_points
@@ -287,7 +302,7 @@ def _search(
     length, best = 1.0, None
     for _ in range(6):
         trial = _applied(model, state, assembly, step, length)
-        found = timer.assemble(model, trial)
+        found = timer.assemble(model, trial, tangent)
         valid = np.all(np.isfinite(found.residual)) and found.least_volume_ratio > 0
         if not valid:
             length /= 2

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
 from rig.mechanics.fe.control import Control, PressureControl, Situation
+from rig.mechanics.fe.coordinates import blend
 from rig.mechanics.fe.linear import LinearSolver, default_solver
 from rig.mechanics.fe.model import Assembly, Model
 from rig.mechanics.fe.newton import Clock, Iteration, Options, Outcome, Target, solve_step
-from rig.mechanics.fe.rotation import rotation_matrix, rotation_vector
-from rig.mechanics.fe.state import PointState, Pose, State
+from rig.mechanics.fe.state import PointState, State
 
 Array = NDArray[np.float64]
 
@@ -28,8 +28,6 @@ _EASY = 5
 """Iterations up to which a step was easy enough to try a longer one."""
 _KNOTS = 4
 """Converged states that a step is extrapolated from."""
-_FAR = 0.4
-"""Strain error of a predicted start beyond which the step is shortened before it is tried."""
 
 
 @dataclass(frozen=True)
@@ -207,10 +205,16 @@ class _Run:
         done, mixed, cuts = 0.0, self.options.mixed_points, 0
         self._here = self._clean(state)
         if not self._past:
+            if self._kind != "mixed":
+                self._step = min(self._step, self.options.first_step)
             self._remember(parameter(0.0), self._here)
         while True:
             started = self.clock()
-            fraction, target, begin, assembly = self._prepare(first, point, parameter, done, mixed)
+            fraction = min(1.0, done + self._step)
+            if 1.0 - fraction < 1e-9:
+                fraction = 1.0
+            target = _between(first, point, fraction)
+            begin, assembly = self._predicted(target, parameter(fraction), mixed)
             preparing = self.clock() - started
             outcome = solve_step(
                 self.model,
@@ -241,15 +245,16 @@ class _Run:
                 self._here = self._clean(outcome.state)
                 self._remember(parameter(fraction), self._here)
                 self._latest = replace(outcome, state=self._here)
-                if fraction == 1.0:
-                    return self._latest
                 if record.solves <= _EASY:
                     self._step = min(1.0, 2 * self._step)
+                if fraction == 1.0:
+                    return self._latest
                 done, mixed, cuts = fraction, self.options.mixed_points, 0
                 continue
             cuts += 1
             # now and then plain Newton with a line search gets where mixed points do not
-            mixed = self.options.mixed_points and cuts % 2 == 0
+            alternate = self.options.mixed_points and self.options.alternate
+            mixed = self.options.mixed_points and (cuts % 2 == 0 or not alternate)
             if mixed == self.options.mixed_points:
                 self._step = (fraction - done) / 2
             if self._step < self.options.least_step:
@@ -262,30 +267,7 @@ class _Run:
         return self.model.assemble(state, tangent=False)
 
     def _remember(self, parameter: float, state: State) -> None:
-        full = self._with_points(state) if self.options.mixed_points else state
-        self._past = [*self._past[1 - _KNOTS :], (parameter, full)]
-
-    def _prepare(
-        self,
-        first: Target,
-        point: Point,
-        parameter: Callable[[float], float],
-        done: float,
-        mixed: bool,
-    ) -> tuple[float, Target, State, Assembly | None]:
-        """How far to go, what must hold there, where to start from, and the assembly there if it
-        was needed to find out."""
-        while True:
-            fraction = min(1.0, done + self._step)
-            if 1.0 - fraction < 1e-9:
-                fraction = 1.0
-            target = _between(first, point, fraction)
-            begin, assembly = self._predicted(target, parameter(fraction), mixed)
-            gap = assembly.gap if assembly is not None else 0.0
-            if gap <= _FAR or self._step < 4 * self.options.least_step:
-                return fraction, target, begin, assembly
-            # the error of the prediction grows with the square of the step or faster
-            self._step = (fraction - done) * max(0.25, 0.8 * (_FAR / gap) ** 0.5)
+        self._past = [*self._past[1 - _KNOTS :], (parameter, state)]
 
     def _predicted(
         self, target: Target, parameter: float, mixed: bool
@@ -300,22 +282,18 @@ class _Run:
         if np.any(np.diff(knots) == 0) or (parameter - knots[-1]) * (knots[-1] - knots[-2]) <= 0:
             return current, None
         weights = _lagrange(knots, parameter)
-        states = [s if mixed else self._clean(s) for _, s in self._past]
-        x = _blend(weights, [s.x for s in states])
-        x[self.model.held] = self.model.prescribed(target.motion)
+        states = [s for _, s in self._past]
+        x, poses = self.model.blended(states, weights, target.motion)
         pressure = float(np.dot(weights, [s.pressure for s in states]))
         if isinstance(self.control, PressureControl):
             pressure = target.control
-        poses = tuple(
-            _extrapolated_pose([s.poses[i] for s in states], last.poses[i], weights)
-            for i in range(len(last.poses))
-        )
         points = tuple(
-            _extrapolated_points([s.points[i] for s in states], weights)
-            for i in range(len(last.points))
+            PointState(blend(weights, [p.pressure for p in parts]))
+            for parts in zip(*(s.points for s in states), strict=True)
         )
         guess = State(x, points, poses, pressure, target.dead, target.motion)
-        guess = self.model.with_bodies_in_place(guess)
+        if mixed:
+            guess = self._with_points(guess)
         found = self.model.assemble(guess)
         if not np.all(np.isfinite(found.residual)) or found.least_volume_ratio <= 0:
             return current, None
@@ -388,25 +366,3 @@ def _between(first: Target, point: Point, fraction: float) -> Target:
         first.dead + fraction * (point.dead - first.dead),
         first.motion + fraction * (point.motion - first.motion),
     )
-
-
-def _blend(weights: Array, parts: list[Array]) -> Array:
-    total = np.zeros_like(parts[0])
-    for w, part in zip(weights, parts, strict=True):
-        total += w * part
-    return total
-
-
-def _extrapolated_points(points: list[PointState], weights: Array) -> PointState:
-    pressure = _blend(weights, [p.pressure for p in points])
-    strains = [p.strain for p in points if p.strain is not None]
-    stresses = [p.stress for p in points if p.stress is not None]
-    if not strains:
-        return PointState(pressure)
-    return PointState(pressure, _blend(weights, strains), _blend(weights, stresses))
-
-
-def _extrapolated_pose(poses: list[Pose], last: Pose, weights: Array) -> Pose:
-    shift = _blend(weights, [p.shift for p in poses])
-    spin = _blend(weights, [rotation_vector(p.rotation @ last.rotation.T) for p in poses])
-    return Pose(shift, rotation_matrix(spin) @ last.rotation)

@@ -29,6 +29,7 @@ from rig.mechanics.fe import (
     gravity,
     rotation_vector,
 )
+from rig.mechanics.fe.coordinates import Bending
 from rig.mechanics.fe.model import Item
 from rig.mechanics.mesh.bellow_bending import (
     BendingBellowMesh,
@@ -46,8 +47,9 @@ Array = NDArray[np.float64]
 
 HANGING = (STANDARD_GRAVITY, 0.0, 0.0)
 """Gravity of an actuator that hangs from its connector, m/s2: along x, towards the tip."""
-FREE_OPTIONS = Options(correction=2e-5)
-"""The tip moves some 60 mm: corrections below 1 um change its angle by 0.001 deg."""
+FREE_OPTIONS = Options(correction=2e-5, first_step=0.35)
+"""The tip moves some 60 mm: corrections below 1 um change its angle by 0.001 deg. The
+actuator is softest at first: a short step there leaves something to extrapolate from."""
 
 
 @dataclass(frozen=True)
@@ -120,12 +122,14 @@ def bending_model(
     acceleration: tuple[float, float, float] = HANGING,
     cap_density: float | None = None,
     items: Callable[[Discretisation, BellowShape], Sequence[Item]] | None = None,
+    arc: bool = True,
 ) -> BendingModel:
     """Mesh the actuator and put its model together.
 
     `acceleration` is gravity in m/s2. The paper is silent about the cap's material; its weight is
     that of `cap_density` in kg/m3, by default the soft material's: both are printed photopolymers.
     `items` makes what acts on the model beside pressure and weight, such as a stop for its tip.
+    `arc` lets steps follow the cap's rotation, which pays where nothing keeps the tip.
     Raises MechanicsError for a material without a volumetric energy.
     """
     return bending_model_on(
@@ -134,6 +138,7 @@ def bending_model(
         acceleration=acceleration,
         cap_density=cap_density,
         items=items,
+        arc=arc,
     )
 
 
@@ -146,6 +151,7 @@ def bending_model_on(
     acceleration: tuple[float, float, float] = HANGING,
     cap_density: float | None = None,
     items: Callable[[Discretisation, BellowShape], Sequence[Item]] | None = None,
+    arc: bool = True,
 ) -> BendingModel:
     """The same on a mesh that is there already; `mixed` and `order` as `discretise` takes them."""
     d = discretise(body.mesh, mixed=mixed, order=order)
@@ -159,6 +165,16 @@ def bending_model_on(
         0.0,
         float(d.nodes[cap, 2].mean()),
     ]
+    end = RigidBody(
+        d,
+        cap,
+        free=("x", "z", "about_y"),
+        centre=np.array(middle),
+        weight=weight * np.array(acceleration),
+    )
+    along = Bending(
+        d, end, -shape.wall, shape.effective_length + shape.wall, height=shape.underside
+    )
     model = Model(
         d,
         [soft],
@@ -168,15 +184,8 @@ def bending_model_on(
         ],
         surface=PressureSurface(d, d.facets_on("cavity")),
         dead_load=gravity(soft, density, np.array(acceleration)),
-        bodies=[
-            RigidBody(
-                d,
-                cap,
-                free=("x", "z", "about_y"),
-                centre=np.array(middle),
-                weight=weight * np.array(acceleration),
-            )
-        ],
+        bodies=[end],
         items=items(d, shape) if items is not None else (),
+        coordinates=along if arc else None,
     )
     return BendingModel(model, soft, shape, body.bottom_far_edge, density, acceleration)
