@@ -54,6 +54,7 @@ class Plan:
     text: str
     """Of its file."""
     actuator: ActuatorSpec
+    material: MaterialSpec
     fields: Mapping[str, NumericField]
     """Factor to field."""
     factors: tuple[Factor, ...]
@@ -83,7 +84,7 @@ def make_plan(path: Path, workspace: Workspace) -> Plan:
     )
     if all(point.task is None for point in points):
         raise StudyError(f"{path}: no point of the design is a valid spec: {points[0].error}")
-    return Plan(spec, source.text, drawing.spec, fields, factors, points)
+    return Plan(spec, source.text, drawing.spec, material, fields, factors, points)
 
 
 def _factors(

@@ -78,9 +78,26 @@ def run_study(
         if not watch(Standing(done, len(keys), left)):
             outcomes.close()  # type: ignore[attr-defined]
             return None
-    answers = tuple(
+    answers = _answers(plan, known)
+    folder.finish(plan, answers, how or {})
+    return Study(plan, answers, len(keys))
+
+
+def known_study(plan: Plan, folder: Folder) -> Study | None:
+    """The study if the answers to all its points are in `folder`, else None."""
+    known = {
+        point.key: found
+        for point in plan.points
+        if point.task is not None and (found := folder.known(point.key)) is not None
+    }
+    if any(point.task is not None and point.key not in known for point in plan.points):
+        return None
+    return Study(plan, _answers(plan, known), 0)
+
+
+def _answers(plan: Plan, known: Mapping[str, Answer]) -> tuple[tuple[Point, Answer], ...]:
+    """In the order of the points; those that are no spec fail with why."""
+    return tuple(
         (point, known[point.key] if point.task is not None else Answer(None, point.error, 0.0))
         for point in plan.points
     )
-    folder.finish(plan, answers, how or {})
-    return Study(plan, answers, len(keys))
