@@ -98,11 +98,12 @@ def predict(
         raise typer.BadParameter(
             "--vtu and --view show the fields of finite elements: add --model fe."
         )
-    table, shortfalls, unreached = [], [], False
+    table, cautions, shortfalls, unreached = [], [], [], False
     with calculating(Console(stderr=True)) as job:
         for name in models:
             response = predict_response(spec, material, name, grid, job)
             table += rows(response if wanted is None else _controlled(response, control, wanted))
+            cautions += [f"Warning: the model {name}: {why}" for why in response.cautions]
             unreached |= bool(np.isnan(response.displacement).any())
             shortfalls += [f"The model {name} is incomplete: {why}" for why in response.shortfalls]
         if vtu is not None:
@@ -118,6 +119,8 @@ def predict(
     _show(spec.name, material.name, table)
     for line in margins:
         typer.echo(line)
+    for line in cautions:
+        typer.echo(line, err=True)
     if csv is not None:
         _write(csv, table)
     if unreached:

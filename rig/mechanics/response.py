@@ -39,6 +39,8 @@ class Response:
     """Largest von Mises stress in Pa, tip free."""
     shortfalls: tuple[str, ...] = ()
     """Why values are missing, where they are."""
+    cautions: tuple[str, ...] = ()
+    """What people must know before they trust it, sentences."""
 
     def at(self, pressure: ArrayLike) -> Response:
         """Response at other pressures in Pa, (m,), by monotone cubic interpolation (PCHIP).
@@ -68,6 +70,7 @@ class Response:
             volume=there(self.volume),
             max_von_mises=None if self.max_von_mises is None else there(self.max_von_mises),
             shortfalls=self.shortfalls,
+            cautions=self.cautions,
         )
 
     def pressure_for(self, quantity: Literal["angle", "volume"], values: ArrayLike) -> Array:

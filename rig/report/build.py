@@ -100,7 +100,8 @@ def _predictions(data: RunData, job: Job) -> tuple[dict[str, Response], list[str
         except MechanicsError as error:
             notes.append(f"There is no prediction of the model {model}: {error}")
             continue
-        notes += [f"The model {model}: {note}" for note in found[model].shortfalls]
+        told = (*found[model].shortfalls, *found[model].cautions)
+        notes += [f"The model {model}: {note}" for note in told]
     return found, notes
 
 

@@ -50,6 +50,18 @@ def test_what_the_family_does_not_have_is_an_empty_column(response: Response) ->
         response.pressure_for("angle", [0.1])
 
 
+def test_an_energy_that_is_unstable_within_its_elongation_is_a_caution(response: Response) -> None:
+    assert response.cautions == ()
+    sound = LIBRARY.material("dragon-skin-30")
+    unsound = sound.model_copy(
+        update={"hyperelastic": sound.hyperelastic.model_copy(update={"c01": -0.02e6, "c11": 0.0})}
+    )
+    found = predict(LIBRARY.actuator("bellow-axisymmetric"), unsound, "fe", [0.0, 1e3])
+    (caution,) = found.at([5e2]).cautions
+    assert "unstable (Drucker)" in caution
+    assert "tension above a stretch of" in caution
+
+
 def test_what_is_for_bending_bellows_refuses_the_family_by_name() -> None:
     actuator = LIBRARY.actuator("bellow-axisymmetric")
     with pytest.raises(MechanicsError, match="The virtual bench is for the family 'bellow-bending"):

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.mechanics.errors import MechanicsError
+from rig.mechanics.hyperelastic.stability import material_stability
 from rig.mechanics.job import Job
 from rig.mechanics.response import Response, interpolated
 from rig.mechanics.simulate.families import FAMILIES, Meshing
@@ -100,6 +101,7 @@ def finite_element_response(
         return interpolated(free.pressure, values, pressures)
 
     measured = free.measured
+    unstable = material_stability(material).warning
     return Response(
         model="fe",
         pressure=pressures,
@@ -111,6 +113,7 @@ def finite_element_response(
         shortfalls=tuple(
             f"{name}: {curves.stopped}" for name, curves in answers if curves.stopped is not None
         ),
+        cautions=() if unstable is None else (f"{unstable}.",),
     )
 
 
