@@ -113,6 +113,19 @@ def test_without_pardiso_only_systems_that_need_superlu_are_warned_of(monkeypatc
             assert default_solver(symmetric, continuous).name == "SuperLU"
 
 
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_pardiso_solves_what_needs_it(symmetric: bool) -> None:
+    pytest.importorskip("pypardiso", reason="pypardiso is not installed")
+    solver = default_solver(symmetric, continuous_pressure=True)
+    assert solver.name == "PARDISO"
+    rng = np.random.default_rng(3)
+    block = rng.normal(size=(30, 30))
+    dense = block + block.T if symmetric else block
+    right = rng.normal(size=(30, 2))
+    solution = solver.factorise(sparse.csc_array(dense)).solve(right)
+    np.testing.assert_allclose(dense @ solution, right, atol=1e-10)
+
+
 def test_both_solvers_walk_the_same_path() -> None:
     tube = bending_tube()
     points = [Point(p) for p in (10e3, 20e3)]
