@@ -131,6 +131,7 @@ def _document(
             "measured_to_s": visit.measured_to_s,
             "pressure_kpa": visit.pressure_kpa,
             "pressure_sd_kpa": _spread(visit.indicated_kpa),
+            "pressure_u_kpa": combine(0.0, visit.pressure_components).u,
             "pressure_parts": _lines(visit.pressure_components),
             "value": value,
             "value_sd": _spread(used),

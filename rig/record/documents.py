@@ -75,6 +75,8 @@ class PointDocument(Document):
     """Mean of the measured pressure between measured_from_s and measured_to_s, corrected as the
     transducer's calibration says."""
     pressure_sd_kpa: float
+    pressure_u_kpa: float
+    """Combined standard uncertainty of `pressure_kpa`: readings and calibration."""
     value: float | None
     """Angle in degrees (deformation) or force in grams (blocked force); None if all rejected."""
     value_sd: float

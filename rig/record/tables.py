@@ -36,6 +36,7 @@ POINT_COLUMNS = (
     "measured_to_s",
     "pressure_kpa",
     "pressure_sd_kpa",
+    "pressure_u_kpa",
     "value",
     "value_sd",
     "value_u",
@@ -53,7 +54,7 @@ def _points(reader: RunReader) -> Iterable[Sequence[object]]:
             *(p.key.experiment, p.key.repeat, p.key.direction, p.key.target_kpa),
             *(_time(p.started_s), _time(p.settled_s)),
             *(_time(p.measured_from_s), _time(p.measured_to_s)),
-            *(_number(p.pressure_kpa), _number(p.pressure_sd_kpa)),
+            *(_number(p.pressure_kpa), _number(p.pressure_sd_kpa), _number(p.pressure_u_kpa)),
             *(_number(p.value), _number(p.value_sd), _number(p.value_u)),
             *(p.unit, p.readings, "; ".join(p.rejected)),
         )

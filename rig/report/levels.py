@@ -107,7 +107,7 @@ def repeats_component(
     if scatter is not None:
         return Component(REPEATS, scatter.sd, scatter.dof, unit=unit, kind="A")
     (point,) = group
-    (line,) = (_component(p) for p in point.value_parts if p.name == READINGS)
+    (line,) = (component_of(p) for p in point.value_parts if p.name == READINGS)
     return replace(line, name=f"{READINGS} (nothing was repeated)")
 
 
@@ -156,11 +156,12 @@ def _by_name(
     found: dict[str, list[Component]] = {}
     for lines in parts:
         for line in lines:
-            found.setdefault(line.name, []).append(_component(line))
+            found.setdefault(line.name, []).append(component_of(line))
     return list(found.items())
 
 
-def _component(part: UncertaintyPart) -> Component:
+def component_of(part: UncertaintyPart) -> Component:
+    """A line of a budget as it was recorded."""
     values = part.model_dump()
     return Component(**values | {"dof": math.inf if part.dof is None else part.dof})
 

@@ -7,6 +7,8 @@ import math
 MODEL_NAMES = {"beam": "beam theory", "fe": "finite elements"}
 NO_BREAK = "\N{NO-BREAK SPACE}"
 MINUS = "\N{MINUS SIGN}"
+MANY_DEGREES_OF_FREEDOM = 1000
+"""Student's factor is then that of the normal distribution to two parts in a thousand."""
 PLUS_MINUS = "\N{PLUS-MINUS SIGN}"
 
 
@@ -49,8 +51,10 @@ def significant(value: float, digits: int = 3) -> str:
 
 
 def freedom(dof: float | None) -> str:
-    """Degrees of freedom, rounded down as tables of t want it; infinite for None."""
-    return "\N{INFINITY}" if dof is None else str(math.floor(dof + 1e-9))
+    """Degrees of freedom, rounded down as tables of t want it; infinite for None or very many."""
+    if dof is None or dof > MANY_DEGREES_OF_FREEDOM:
+        return "\N{INFINITY}"
+    return str(math.floor(dof + 1e-9))
 
 
 def duration(seconds: float) -> str:

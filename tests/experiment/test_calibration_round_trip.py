@@ -131,7 +131,7 @@ def syringe_en(true: Instruments, made: SyringeCalibration) -> list[float]:
     ]
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_a_transducer_is_found_again_better_than_its_data_sheet(seed: int) -> None:
     true, made = calibrated_transducer(seed)
     assert max(map(abs, transducer_en(true, made))) < 1
@@ -139,14 +139,14 @@ def test_a_transducer_is_found_again_better_than_its_data_sheet(seed: int) -> No
     assert made.gain_u < 0.75 * CALIBRATIONS.transducer.gain_u
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_a_load_cell_is_found_again(seed: int) -> None:
     true, made = calibrated_cell(seed)
     assert max(map(abs, cell_en(true, made))) < 1
     assert made.counts_per_gram_u < CALIBRATIONS.load_cell.counts_per_gram_u
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_a_syringe_is_found_again(seed: int) -> None:
     true, made = calibrated_syringe(seed)
     assert max(map(abs, syringe_en(true, made))) < 1

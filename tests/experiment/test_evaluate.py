@@ -113,6 +113,7 @@ def test_a_pressure_is_corrected_for_the_bow_and_carries_its_own_budget() -> Non
     share = 4 * (3.03 / 12) * (1 - 3.03 / 12)
     parts = [0.01 / 3**0.5, 0.001 * 3.03, 0.01 * share, 0.005]
     assert [p.sensitivity * p.u for p in point.pressure_parts] == pytest.approx(parts)
+    assert point.pressure_u_kpa == pytest.approx(np.linalg.norm(parts))
 
 
 def test_what_vision_is_unsure_of_is_parted_into_lens_and_the_rest() -> None:

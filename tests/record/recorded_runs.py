@@ -42,6 +42,7 @@ def point(number: int) -> PointDocument:
         measured_to_s=began + 4,
         pressure_kpa=number + 0.001,
         pressure_sd_kpa=0.01,
+        pressure_u_kpa=0.008,
         value=None if number == 2 else 5.0 * number,
         value_sd=0.1,
         value_u=0.2,

@@ -177,6 +177,7 @@ class _Teller:
             measured_to_s=to_s,
             pressure_kpa=float(pressure.mean()),
             pressure_sd_kpa=float(pressure.std(ddof=1)),
+            pressure_u_kpa=0.008,
             value=value,
             value_sd=0.05,
             value_u=float(np.hypot(u, 0.05 / np.sqrt(readings))),

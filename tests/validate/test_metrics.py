@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from rig.validate.metrics import (
     normalised,
     repeatability,
     rmse,
+    same_variance,
     validation_statement,
 )
 from rig.validate.uncertainty import Estimate
@@ -180,3 +182,29 @@ def test_hysteresis_is_the_widest_gap_between_the_branches() -> None:
 def test_hysteresis_needs_both_branches() -> None:
     assert hysteresis(np.arange(3.0), np.full(3, np.nan)) is None
     assert hysteresis(np.zeros(3), np.ones(3)) is None
+
+
+def test_one_group_that_scatters_more_is_found_by_cochrans_test() -> None:
+    # ISO 5725-2, Table 4: critical value at 5 % for 6 groups of 3 is 0.616
+    def groups(largest: float) -> list[np.ndarray]:
+        others = (1 - largest) / 5
+        return [np.sqrt(v) * np.array([-1.0, 0.0, 1.0]) for v in [largest, *[others] * 5]]
+
+    assert same_variance(groups(0.610))
+    assert not same_variance(groups(0.622))
+
+
+def test_groups_without_scatter_or_alone_agree() -> None:
+    assert same_variance([np.zeros(3), np.zeros(3)])
+    assert same_variance([np.array([1.0, 2.0])])
+    assert same_variance([np.array([1.0]), np.array([2.0])])
+
+
+def test_what_the_models_inputs_leave_open_counts_for_validation_alone() -> None:
+    plain = errors_of([1.0] * LEVELS, u=0.1)
+    open_ = replace(plain, u_input={"modulus": np.full(LEVELS, 0.8)})
+    assert rmse(open_) == rmse(plain)
+    assert bias(open_) == bias(plain)
+    assert open_.u_validation == pytest.approx(np.hypot(0.1, 0.8))
+    assert not validation_statement(plain).agrees
+    assert validation_statement(open_).agrees

@@ -1,0 +1,35 @@
+"""Whether 95 % intervals hold the truth in 95 of 100 measurements, no less and no more."""
+
+from __future__ import annotations
+
+import pytest
+
+from .coverage import force_coverage, pressure_coverage
+
+FEW = range(30)
+MANY = range(1000)
+LOWEST, HIGHEST = 0.93, 0.97
+
+
+def test_the_interval_of_a_pressure_holds_the_truth_as_often_as_it_says() -> None:
+    found = pressure_coverage(FEW)
+    assert found.plausible, found
+
+
+def test_the_interval_of_a_force_holds_the_truth_as_often_as_it_says() -> None:
+    found = force_coverage(FEW)
+    assert found.plausible, found
+
+
+@pytest.mark.slow
+def test_of_a_thousand_pressures_93_to_97_percent_are_within_their_interval() -> None:
+    found = pressure_coverage(MANY)
+    print(f"\npressure: {found}")
+    assert LOWEST <= found.share <= HIGHEST, found
+
+
+@pytest.mark.slow
+def test_of_a_thousand_forces_93_to_97_percent_are_within_their_interval() -> None:
+    found = force_coverage(MANY)
+    print(f"\nforce: {found}")
+    assert LOWEST <= found.share <= HIGHEST, found
