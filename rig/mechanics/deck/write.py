@@ -27,6 +27,7 @@ _TONNE_PER_MM3 = 1e-12
 _MEGAPASCAL = 1e6
 _PER_LINE = 16
 """Entries of a data line at most, in both programs."""
+_REPORTED = "REPORTED"
 
 
 def write_deck(
@@ -85,6 +86,10 @@ def _lines(
     for name, nodes in {"CLAMPED": clamped, "SYMMETRY": symmetry, "CAP": cap_nodes}.items():
         yield f"*NSET, NSET={name}"
         yield from _rows(nodes + 1)
+    if own_rotation:
+        # CalculiX cuts its increments as it likes; at these it stops and prints
+        yield f"*TIME POINTS, NAME={_REPORTED}, GENERATE"
+        yield f"{1 / increments:.9g}, 1, {1 / increments:.9g}"
     faces = yield from _surfaces(actuator, elements)
     yield from _material(actuator)
     yield from _supports(reference, rotation if own_rotation else None)
@@ -157,12 +162,13 @@ def _step(increments: int) -> Iterator[str]:
 
 
 def _output(own_rotation: bool) -> Iterator[str]:
+    when = f", TIME POINTS={_REPORTED}" if own_rotation else ""
     for name in ("CAP_REFERENCE", "CAP_ROTATION") if own_rotation else ("CAP_REFERENCE",):
-        yield f"*NODE PRINT, NSET={name}"
+        yield f"*NODE PRINT, NSET={name}{when}"
         yield "U"
-    yield "*NODE FILE"
+    yield f"*NODE FILE{when}"
     yield "U"
-    yield "*EL FILE"
+    yield f"*EL FILE{when}"
     yield "S, E"
     yield "*END STEP"
 
