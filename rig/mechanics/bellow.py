@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rig.mechanics.convolution import HalfConvolution
 from rig.mechanics.errors import MechanicsError
-from rig.mechanics.section import disc_union
+from rig.mechanics.section import SectionIntegrals, disc_union
 from rig.spec.actuator import ActuatorSpec, BellowBendingGeometry
 
 Array = NDArray[np.float64]
@@ -203,8 +203,19 @@ class BellowShape:
         return density * self.cap_volume
 
     @property
+    def cap_centre(self) -> Array:
+        """Centre of mass of the end cap, (3,) in m."""
+        end = self._end_section
+        along = self.effective_length + self.wall + self.cap_thickness / 2
+        return np.array([along, 0.0, float(end.moment / end.area)])
+
+    @property
     def _end_section_area(self) -> float:
-        return float(disc_union(np.array(self.end_wall_top), self.solid_section).area)
+        return float(self._end_section.area)
+
+    @property
+    def _end_section(self) -> SectionIntegrals:
+        return disc_union(np.array(self.end_wall_top), self.solid_section)
 
     def swept_volume(self, offset: float, section: Array) -> float:
         """Integral over x of the union of the revolved profile with a constant section.

@@ -92,6 +92,16 @@ def test_ends_have_the_area_of_the_end_wall(levels):
     assert far == pytest.approx([area, 0, 0], abs=2e-5 * area)
 
 
+def test_the_cap_s_centre_is_that_of_the_face_it_covers(levels):
+    shape, mesh = levels[1].shape, levels[1].mesh
+    face = skfem.FacetBasis(mesh, mesh.elem(), facets=mesh.boundaries["cap"])
+    height = np.asarray(face.global_coordinates())[2]
+    centre = float(np.sum(height * face.dx) / np.sum(face.dx))
+    assert shape.cap_centre[2] == pytest.approx(centre, rel=1e-4)
+    thickness = shape.effective_length + shape.wall, shape.tip
+    assert shape.cap_centre[0] == pytest.approx(np.mean(thickness))
+
+
 def test_far_lower_edge_lies_where_the_cap_begins(levels):
     level = levels[0]
     x, y, z = level.mesh.doflocs[:, level.bottom_far_edge]

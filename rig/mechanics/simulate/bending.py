@@ -160,16 +160,11 @@ def bending_model_on(
     shape = body.shape
     weight = shape.cap_mass(density if cap_density is None else cap_density) / 2
     cap = d.nodes_on("cap")
-    middle = [
-        shape.effective_length + shape.wall + shape.cap_thickness / 2,
-        0.0,
-        float(d.nodes[cap, 2].mean()),
-    ]
     end = RigidBody(
         d,
         cap,
         free=("x", "z", "about_y"),
-        centre=np.array(middle),
+        centre=shape.cap_centre,
         weight=weight * np.array(acceleration),
     )
     along = Bending(
