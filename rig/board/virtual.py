@@ -173,7 +173,6 @@ class VirtualBench:
             self.line = FaultyLine(self._board, self.plant, faults.faults, seed)
         self.bus = SlcanBus(self.line or self._board)
         camera = VirtualCamera(
-            setup.calibrations.camera,
             virtual_part(setup.bench).optics,
             setup.calibrations.ruler,
             specimen.geometry,

@@ -92,8 +92,7 @@ class VirtualCalibrationBench:
             bench.ambient.temperature - CELSIUS,
             np.random.default_rng(seeds.references),
         )
-        self.board = board_on(bench, self.plant)
-        self.bus = SlcanBus(self.board)
+        self.bus = SlcanBus(board_on(bench, self.plant))
 
     def mount(self, fixture: Literal["free", "blocked", "plugged"]) -> None:
         """Arrange the bench."""

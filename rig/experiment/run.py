@@ -27,6 +27,7 @@ from rig.experiment.prepare import (
     vented_pressure_kpa,
     write_parameters,
 )
+from rig.experiment.recheck import recheck_camera
 from rig.experiment.recorder import LinkRecorder
 from rig.experiment.setup import RunRequest
 from rig.experiment.sweep import Arrival, approach, go_to, settle
@@ -208,11 +209,16 @@ def _experiments(
 ) -> None:
     """Every sweep that still has points to take."""
     link, observer = context.link, context.observer
+    sweeps = context.request.plan.sweeps
     observer.began(context.request.plan, len(done))
     mounted: ExperimentName | None = None
     observer.stage("homing the plunger and zeroing the transducer")
     make_ready(link)
-    for sweep in context.request.plan.sweeps:
+    if any(s.experiment == "deformation" and not done.issuperset(s.keys) for s in sweeps):
+        observer.stage("checking the calibration of the camera")
+        residual = recheck_camera(context.bench.camera, _meter(context))
+        record.event(link.now_s, "camera checked", {"ruler_residual_px": f"{residual:.4f}"})
+    for sweep in sweeps:
         left = [key for key in sweep.keys if key not in done]
         if not left:
             continue
@@ -275,13 +281,18 @@ def _sweep(
     require_zero(vented_pressure_kpa(link), section.settling.tolerance / 1e3)
 
 
+def _meter(context: RunContext) -> AngleMeter:
+    calibrations = context.request.setup.calibrations
+    return AngleMeter(calibrations.camera, calibrations.ruler)
+
+
 def _measurement(context: RunContext, experiment: ExperimentName) -> Measurement:
     setup, section = context.request.setup, context.request.plan.settings(experiment)
     calibrations = setup.calibrations
     if isinstance(section, DeformationProtocol):
         return AngleMeasurement(
             camera=context.bench.camera,
-            meter=AngleMeter(calibrations.camera, calibrations.ruler),
+            meter=_meter(context),
             calibration=calibrations.camera,
             frames=section.frames,
             frame_period_s=1 / setup.bench.camera.frame_rate,

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from rig.mechanics.profile import side_profile
 from rig.plant.layout import ProfileFunction, lay_out
-from rig.plant.optics import draw_projection
+from rig.plant.optics import draw_lens, draw_projection
 from rig.plant.scene import Image, Light, Scene, Surface, linear
 from rig.spec.actuator import BellowBendingGeometry
 from rig.spec.bench import VirtualOptics
-from rig.spec.calibration import CameraCalibration, RulerCalibration
+from rig.spec.calibration import RulerCalibration
 
 _NOISE_MARGIN = 96
 _BLACK_LEVEL = 3
@@ -69,16 +69,15 @@ class SensorNoise:
 class VirtualCamera:
     """A USB camera in front of the virtual bench.
 
-    `rng` draws how crooked the camera stands, the direction of the light, the background and the
-    noise; the same generator state gives the same camera, and the same angle and time the same
-    picture, however many were taken before. `profile` gives the actuator's outlines.
+    `rng` draws the lens, how crooked the camera stands, the direction of the light, the background
+    and the noise; the same generator state gives the same camera, and the same angle and time the
+    same picture, however many were taken before. `profile` gives the actuator's outlines.
     `fault` may be set at any time. Raises SceneError if actuator and ruler do not fit into the
     picture.
     """
 
     def __init__(
         self,
-        calibration: CameraCalibration,
         optics: VirtualOptics,
         ruler: RulerCalibration,
         geometry: BellowBendingGeometry,
@@ -86,8 +85,9 @@ class VirtualCamera:
         rng: np.random.Generator,
         profile: ProfileFunction = side_profile,
     ) -> None:
-        pose, light, cloth, noise = rng.spawn(4)
-        self.projection = draw_projection(calibration, optics, pose)
+        pose, light, cloth, noise, glass = rng.spawn(5)
+        lens = draw_lens(optics.lens, glass)
+        self.projection = draw_projection(lens, optics, pose)
         self.layout = lay_out(geometry, ruler, self.projection, profile)
         self.fault = CameraFault.NONE
         self._geometry = geometry
@@ -101,7 +101,7 @@ class VirtualCamera:
             optics.blur,
             cloth,
         )
-        self._noise = SensorNoise(calibration.width, calibration.height, optics.noise, noise)
+        self._noise = SensorNoise(lens.width, lens.height, optics.noise, noise)
         # 4:2:2, as USB cameras send it; OpenCV would halve the colour in both directions.
         self._encoding = [
             cv2.IMWRITE_JPEG_QUALITY,

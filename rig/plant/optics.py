@@ -11,10 +11,40 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.spec.bench import VirtualOptics
-from rig.spec.calibration import CameraCalibration
+from rig.spec.bench import VirtualLens, VirtualOptics
 
 Array = NDArray[np.float64]
+Distortion = tuple[float, float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Lens:
+    """What a camera's lens and sensor truly are, pixels; no experiment sees it."""
+
+    width: int
+    height: int
+    focal_x: float
+    focal_y: float
+    centre_x: float
+    centre_y: float
+    distortion: Distortion
+    """k1, k2, p1, p2, k3."""
+
+
+def draw_lens(sheet: VirtualLens, rng: np.random.Generator) -> Lens:
+    """A specimen of the lens that a data sheet describes."""
+    focal = sheet.focal * (1 + rng.normal(0, sheet.focal_spread))
+    x, y = rng.normal(0, sheet.centre_spread, 2)
+    k1, k2, p1, p2, k3 = rng.normal(sheet.distortion, sheet.distortion_spread).tolist()
+    return Lens(
+        width=sheet.width,
+        height=sheet.height,
+        focal_x=focal,
+        focal_y=focal,
+        centre_x=0.5 * (sheet.width - 1) + float(x),
+        centre_y=0.5 * (sheet.height - 1) + float(y),
+        distortion=(k1, k2, p1, p2, k3),
+    )
 
 
 @dataclass(frozen=True)
@@ -30,7 +60,7 @@ class Projection:
     height: int
     focal: tuple[float, float]
     centre: tuple[float, float]
-    distortion: tuple[float, float, float, float, float]
+    distortion: Distortion
     """k1, k2, p1, p2, k3."""
     rotation: tuple[tuple[float, float, float], ...]
     """Bench axes to camera axes, row by row."""
@@ -71,9 +101,7 @@ class Projection:
         )
 
 
-def aim(
-    calibration: CameraCalibration, distance: float, pan: float, tilt: float, roll: float
-) -> Projection:
+def aim(lens: Lens, distance: float, pan: float, tilt: float, roll: float) -> Projection:
     """A camera `distance` metres from the bench origin that looks at it.
 
     `pan`, `tilt` and `roll` (rad) turn it about the bench's vertical, the horizontal and its own
@@ -81,22 +109,20 @@ def aim(
     """
     rotation = _about_z(roll) @ _about_x(tilt) @ _about_y(pan)
     return Projection(
-        width=calibration.width,
-        height=calibration.height,
-        focal=(calibration.focal_x, calibration.focal_y),
-        centre=(calibration.centre_x, calibration.centre_y),
-        distortion=calibration.distortion,
+        width=lens.width,
+        height=lens.height,
+        focal=(lens.focal_x, lens.focal_y),
+        centre=(lens.centre_x, lens.centre_y),
+        distortion=lens.distortion,
         rotation=tuple((float(a), float(b), float(c)) for a, b, c in rotation),
         distance=distance,
     )
 
 
-def draw_projection(
-    calibration: CameraCalibration, optics: VirtualOptics, rng: np.random.Generator
-) -> Projection:
+def draw_projection(lens: Lens, optics: VirtualOptics, rng: np.random.Generator) -> Projection:
     """The camera as somebody set it up: pan, tilt and roll are normal with sd `optics.tilt`."""
     pan, tilt, roll = rng.normal(0.0, optics.tilt, 3)
-    return aim(calibration, optics.distance, float(pan), float(tilt), float(roll))
+    return aim(lens, optics.distance, float(pan), float(tilt), float(roll))
 
 
 def _about_x(angle: float) -> Array:

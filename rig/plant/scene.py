@@ -116,7 +116,8 @@ class Scene:
         """Linear light (3, height, width) of all that stands still but the connector."""
         # Planes for one frame: fresh memory for each would cost more than the arithmetic.
         self._scratch = np.empty((6, projection.height * projection.width), np.float32)
-        self._still = self._developed(self._ground * (1 - self._connector) + self._connector_light)
+        still = self._ground * (1 - self._connector) + self._connector_light
+        self._still = developed(still, blur)
 
     def picture(self, profile: SideProfile, before: Sequence[Surface] = ()) -> Image:
         """The picture (height, width, 3), BGR, 8 bit, without noise, of the deformed actuator.
@@ -139,8 +140,7 @@ class Scene:
         light = self._actuator_light(parts, box)
         for surface, outline in zip(before, hiding, strict=True):
             light = _over(light, surface.colour[:, None, None], coverage(outline, box))
-        developed = self._developed(light)
-        picture[seen.slices] = developed[seen.within(box).slices]
+        picture[seen.slices] = developed(light, self._blur)[seen.within(box).slices]
         return picture
 
     def _actuator_light(self, parts: list[Array], box: Box) -> Picture:
@@ -209,14 +209,6 @@ class Scene:
         cv2.resize(near, glow.shape[::-1], dst=glow)
         return around, glow
 
-    def _developed(self, light: Picture) -> Image:
-        """8-bit BGR of linear light (3, rows, columns): point spread, then tone curve."""
-        planes = []
-        for plane in light:
-            spread = cv2.GaussianBlur(plane, (0, 0), self._blur) if self._blur > 0 else plane
-            planes.append(cv2.convertScaleAbs(cv2.sqrt(spread), alpha=255.0))
-        return np.asarray(cv2.merge(planes), dtype=np.uint8)
-
     def _cover(self, outline: Array, box: Box) -> Picture:
         """Coverage of an outline in bench metres."""
         return coverage(self._projection.project(densified(outline, _OUTLINE_STEP)), box)
@@ -256,6 +248,15 @@ class Scene:
             mark = self._cover(centre + disc, self._whole)
             light = _over(light, MARK_BLACK[:, None, None], mark)
         return light
+
+
+def developed(light: Picture, blur: float) -> Image:
+    """8-bit BGR of linear light (3, rows, columns): point spread of sd `blur`, then tone curve."""
+    planes = []
+    for plane in light:
+        spread = cv2.GaussianBlur(plane, (0, 0), blur) if blur > 0 else plane
+        planes.append(cv2.convertScaleAbs(cv2.sqrt(spread), alpha=255.0))
+    return np.asarray(cv2.merge(planes), dtype=np.uint8)
 
 
 def densified(outline: Array, step: float) -> Array:

@@ -257,9 +257,27 @@ class VirtualReferences(SpecModel):
     balance_resolution: Mass = Field(ge=0, description="last digit of the balance")
 
 
-class VirtualOptics(SpecModel):
-    """Where the simulated camera stands, and what spoils its picture."""
+class VirtualLens(SpecModel):
+    """The simulated lens as its data sheet has it, and how far a specimen may be from that.
 
+    Spreads are standard deviations. The hidden lens is drawn from here, never from a calibration.
+    """
+
+    width: Count = Field(le=20_000, description="of the picture, pixels")
+    height: Count = Field(le=20_000)
+    focal: Number = Field(gt=0, description="pixels")
+    focal_spread: Ratio = Field(ge=0, description="relative")
+    centre_spread: Number = Field(ge=0, description="about the middle of the picture, pixels")
+    distortion: tuple[Number, Number, Number, Number, Number] = Field(
+        description="k1, k2, p1, p2, k3 of Brown and Conrady"
+    )
+    distortion_spread: tuple[Number, Number, Number, Number, Number]
+
+
+class VirtualOptics(SpecModel):
+    """The simulated camera: its lens, where it stands, and what spoils its picture."""
+
+    lens: VirtualLens
     distance: Length = Field(gt=0, description="camera to the plane of bending")
     tilt: Angle = Field(
         ge=0, le=math.radians(20), description="standard deviation of pan, tilt and roll"

@@ -58,7 +58,9 @@ class Fit(SpecModel):
     parameters: tuple[str, ...]
     values: tuple[Number, ...]
     covariance: tuple[tuple[Number, ...], ...]
-    residuals: tuple[Number, ...] = Field(description="measured minus fitted")
+    residuals: tuple[Number, ...] = Field(
+        (), description="measured minus fitted; left out where there are thousands"
+    )
     degrees_of_freedom: Number = Field(ge=0, description="of the points that count as independent")
 
 

@@ -127,6 +127,16 @@ class AngleMeasurement:
 
 
 @dataclass(frozen=True)
+class RulerCheck:
+    """What the marks of the ruler say about the lens."""
+
+    residual_px: float | None
+    """RMS distance of the marks from a flat grid; None if they were not found."""
+    reason: str
+    """Why not."""
+
+
+@dataclass(frozen=True)
 class Sighting:
     """What a frame tells about where to look in the next one."""
 
@@ -163,6 +173,22 @@ class AngleMeter:
         """
         self._check(image_bgr)
         return self._measure(pyramid(image_bgr))
+
+    def check_ruler(self, image_bgr: Image) -> RulerCheck:
+        """How flat a grid the ruler's marks are through the lens that is assumed.
+
+        They are not where the camera's calibration is of another lens. Needs a ruler. Raises
+        VisionError as `measure`.
+        """
+        assert self.ruler is not None
+        self._check(image_bgr)
+        try:
+            marks = find_ruler(pyramid(image_bgr), self.ruler.marks)
+            plane = rectify(self.camera, self.ruler, marks)
+        except UntrustedFrameError as why:
+            return RulerCheck(None, str(why))
+        assert plane.rectification is not None
+        return RulerCheck(plane.rectification.residual_px, "")
 
     def measure_again(
         self, image_bgr: Image, last: Sighting, move: FloatArray, margin: float

@@ -41,7 +41,6 @@ def table() -> list[tuple[str, str, str]]:
 
     def set_up() -> VirtualCamera:
         return VirtualCamera(
-            calibrations.camera,
             bench.virtual.optics,
             calibrations.ruler,
             geometry,

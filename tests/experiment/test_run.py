@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import textwrap
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from rig.board.virtual import VirtualBench
 from rig.experiment.bench import Nobody
 from rig.experiment.errors import AbortedError
 from rig.experiment.prepare import board_parameters
+from rig.experiment.recheck import LOOKS
 from rig.experiment.replay import ReplayedRun
 from rig.link.e2e import protect
 from rig.link.errors import BoardFaultError, UnexpectedStateError
@@ -98,14 +98,17 @@ def test_the_way_down_lies_above_the_way_up(short_run: VirtualRun) -> None:
 
 def test_a_board_that_falls_idle_under_a_point_ends_the_run(tmp_path: Path) -> None:
     class Blinks:
-        """Between the frames of the third point the supply blinks: idle again, and no fault."""
+        """Between the frames of the third point the supply blinks: idle again, and no fault.
+
+        `LOOKS` frames were taken before, to check the calibration.
+        """
 
         def __init__(self, bench: VirtualBench) -> None:
             self._bench, self._camera, self._frames = bench, bench.camera, 0
 
         def grab(self) -> tuple[float, bytes]:
             self._frames += 1
-            if self._frames == 5:
+            if self._frames == LOOKS + 5:
                 idle = {"opcode": 9, "number": 100, "argument": 0.0}
                 frame_id, payload = load_schema().encode("COMMAND", idle)
                 self._bench.bus.send(frame_id, protect(frame_id, payload, 14))
@@ -155,8 +158,19 @@ def test_a_disk_that_fills_between_points_does_not_keep_the_bench_from_venting(
 
 
 def test_a_dark_picture_ends_the_run_instead_of_a_point_without_a_value(tmp_path: Path) -> None:
+    class GoesDark:
+        """After the frames that check the calibration the light is off."""
+
+        def __init__(self, bench: VirtualBench) -> None:
+            self._camera, self._frames = bench.camera, 0
+
+        def grab(self) -> tuple[float, bytes]:
+            self._frames += 1
+            self._camera.fault = CameraFault.DARK if self._frames > LOOKS else CameraFault.NONE
+            return self._camera.grab()
+
     def darken(bench: VirtualBench) -> None:
-        bench.camera.fault = CameraFault.DARK
+        bench.camera = GoesDark(bench)  # type: ignore[assignment]
 
     run = take(tmp_path / "run", make_request(), prepare=darken)
     assert run.outcome.stop.exit_status == "failed"
@@ -228,15 +242,6 @@ class StopsAfter(Nobody):
     def check(self) -> None:
         if self._left <= 0:
             raise AbortedError("stopped on request.")
-
-
-def test_what_a_run_was_cautioned_of_is_a_warning_in_its_log(tmp_path: Path) -> None:
-    stopper = StopsAfter(1)
-    request = replace(make_request(), cautions=("the calibration of load cell has expired",))
-    run = take(tmp_path / "run", request, observer=stopper, interrupted=stopper.check)
-    (warning,) = (event for event in run.reader.events() if event.name == "caution")
-    assert warning.level == "warning"
-    assert warning.data == {"what": "the calibration of load cell has expired"}
 
 
 def test_an_interrupted_run_is_vented_readable_and_resumable(

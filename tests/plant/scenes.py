@@ -20,7 +20,6 @@ GEOMETRY = LIBRARY.actuator("bellow-bending").geometry
 def camera(seed=1, geometry=GEOMETRY, ruler=RULER, **optics):
     """A virtual camera; keywords replace entries of the bench's optics."""
     return VirtualCamera(
-        CAMERA,
         OPTICS.model_copy(update=optics),
         ruler,
         geometry,

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from rig.plant.optics import aim, draw_projection
+from rig.plant.optics import aim, draw_lens, draw_projection
 from rig.spec.workspace import Workspace
 
 LIBRARY = Workspace(Path(__file__).parents[2])
@@ -90,3 +90,17 @@ def test_setups_scatter_as_the_bench_says():
     )
     pan, tilt, roll = rotations[:, 0, 2], -rotations[:, 1, 2], rotations[:, 1, 0]
     np.testing.assert_allclose([pan.std(), tilt.std(), roll.std()], sd, rtol=0.06)
+
+
+def test_lenses_scatter_as_their_data_sheet_says():
+    sheet = BENCH.virtual.optics.lens
+    rng = np.random.default_rng(0)
+    lenses = [draw_lens(sheet, rng) for _ in range(1500)]
+    focal = np.array([lens.focal_x for lens in lenses])
+    centres = np.array([(lens.centre_x, lens.centre_y) for lens in lenses])
+    distortion = np.array([lens.distortion for lens in lenses])
+    assert focal.mean() == pytest.approx(sheet.focal, rel=4 * sheet.focal_spread / 1500**0.5)
+    assert focal.std() == pytest.approx(sheet.focal * sheet.focal_spread, rel=0.06)
+    np.testing.assert_allclose(centres.std(axis=0), sheet.centre_spread, rtol=0.06)
+    np.testing.assert_allclose(distortion.std(axis=0), sheet.distortion_spread, rtol=0.06)
+    assert (lenses[0].width, lenses[0].height) == (sheet.width, sheet.height)

@@ -35,14 +35,10 @@ def light(picture):
 
 def on_the_plane(seen, pixels):
     """Bench coordinates of pixels, by OpenCV's undistortion and a ray through the plane."""
-    matrix = np.array(
-        [
-            [CAMERA.focal_x, 0, CAMERA.centre_x],
-            [0, CAMERA.focal_y, CAMERA.centre_y],
-            [0, 0, 1],
-        ]
-    )
-    rays = cv2.undistortPoints(pixels.reshape(-1, 1, 2), matrix, np.array(CAMERA.distortion))[:, 0]
+    (focal_x, focal_y), (x, y) = seen.projection.focal, seen.projection.centre
+    matrix = np.array([[focal_x, 0, x], [0, focal_y, y], [0, 0, 1]])
+    distortion = np.array(seen.projection.distortion)
+    rays = cv2.undistortPoints(pixels.reshape(-1, 1, 2), matrix, distortion)[:, 0]
     rotation = np.array(seen.projection.rotation)
     plane_to_rays = np.column_stack(
         (rotation[:, 0], rotation[:, 1], [0.0, 0.0, seen.projection.distance])

@@ -24,7 +24,6 @@ ANGLES = 40.0 + 15.0 * (1.0 - np.cos(np.linspace(0.0, np.pi, 12)))
 
 def camera(seed: int = 3) -> VirtualCamera:
     return VirtualCamera(
-        CALIBRATIONS.camera,
         BENCH.virtual.optics,
         CALIBRATIONS.ruler,
         LIBRARY.actuator("bellow-bending").geometry,

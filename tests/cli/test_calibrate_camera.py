@@ -1,0 +1,82 @@
+"""`rig calibrate camera` and `ruler` on the virtual bench: the hidden lens is found."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rig.board.virtual import Seeds
+from rig.board.virtual_target import hidden_lean
+from rig.plant.optics import draw_lens
+from rig.spec.calibration import CameraCalibration, RulerCalibration
+from rig.spec.loading import read
+from rig.spec.workspace import Workspace
+from tests.cli.conftest import rig  # noqa: F401
+
+SEED = 3
+
+
+def hidden_lens():
+    optics = Workspace.find().bench("virtual").virtual.optics
+    return draw_lens(optics.lens, np.random.default_rng(Seeds.of(SEED, 0).camera).spawn(5)[4])
+
+
+def test_the_lens_of_the_bench_is_found_within_its_uncertainty(rig, tmp_path):  # noqa: F811
+    file, plot = tmp_path / "camera.yaml", tmp_path / "residuals.png"
+    outcome = rig(
+        *("calibrate", "camera", "--seed", SEED, "--views", 10, "--out", file, "--plot", plot)
+    )
+    assert outcome.code == 0, outcome.err
+    assert plot.read_bytes().startswith(b"\x89PNG")
+    made = read(file, CameraCalibration).spec
+    assert made.provenance.simulated
+    assert made.provenance.valid_until is not None
+    (fit,) = made.evidence.fits
+    lens = hidden_lens()
+    centre = (lens.centre_x, lens.centre_y)
+    true = np.array([lens.focal_x, lens.focal_y, *centre, *lens.distortion[:4]])
+    scores = (np.array(fit.values) - true) / np.sqrt(np.diag(fit.covariance))
+    assert np.abs(scores).max() < 3.5
+    known = Workspace.find().resolve_bench(Workspace.find().bench("virtual")).camera
+    assert abs(made.focal_x - lens.focal_x) < abs(known.focal_x - lens.focal_x)
+    assert made.angle_u_deg < known.angle_u_deg
+
+
+def test_a_ruler_is_found_as_square_as_it_is(rig, tmp_path):  # noqa: F811
+    file = tmp_path / "ruler.yaml"
+    outcome = rig(
+        *("calibrate", "ruler", "--seed", SEED, "--views", 4, "--out", file),
+        *("--pitch-mm", "10.002", "--pitch-u-mm", "0.004"),
+    )
+    assert outcome.code == 0, outcome.err
+    made = read(file, RulerCalibration).spec
+    lean_deg, _ = made.evidence.fits[0].values
+    known = Workspace.find().resolve_bench(Workspace.find().bench("virtual")).ruler
+    hidden = np.degrees(hidden_lean(known, SEED))
+    assert lean_deg == pytest.approx(hidden, abs=2.0 * made.squareness_u_deg)
+    assert made.pitch == pytest.approx(10.002e-3)
+    assert made.pitch_u == pytest.approx(0.004e-3)
+
+
+def test_a_pitch_without_its_uncertainty_is_refused(rig):  # noqa: F811
+    outcome = rig("calibrate", "ruler", "--pitch-mm", "10")
+    assert outcome.code != 0
+    assert "belong together" in outcome.err
+
+
+def test_the_board_can_be_printed(rig, tmp_path):  # noqa: F811
+    assert rig("calibrate", "camera", "--board", tmp_path / "board.png").code == 0
+    assert (tmp_path / "board.png").read_bytes().startswith(b"\x89PNG")
+    outcome = rig("calibrate", "camera", "--board", tmp_path / "no" / "board.png")
+    assert outcome.code != 0
+    assert "cannot be written" in outcome.err
+
+
+def test_pictures_without_a_board_are_refused(rig, tmp_path):  # noqa: F811
+    import cv2
+
+    cv2.imwrite(str(tmp_path / "grey.png"), np.full((720, 1280, 3), 90, np.uint8))
+    outcome = rig("calibrate", "camera", tmp_path / "grey.png", "--out", tmp_path / "x.yaml")
+    assert outcome.code != 0
+    assert "The board was found in 0 pictures" in outcome.err
+    assert not (tmp_path / "x.yaml").exists()
