@@ -54,7 +54,7 @@ class Order:
 
 
 @dataclass(frozen=True)
-class Job:
+class Task:
     """A calibration about to be done on a bench, or from points taken elsewhere."""
 
     instrument: str
@@ -175,10 +175,10 @@ class Job:
         )
 
 
-def new_job(
+def new_task(
     instrument: str, order: Order, standard: Callable[[VirtualReferences], Standard]
-) -> Job:
-    """A job; `standard` is what a simulated bench is compared with.
+) -> Task:
+    """A task; `standard` is what a simulated bench is compared with.
 
     Raises SpecError for a bench that cannot be read, and BadParameter where a real reference is
     not stated.
@@ -195,7 +195,7 @@ def new_job(
         )
     else:
         known = Standard(order.reference, order.reference_u / 100)
-    return Job(instrument, order, workspace, bench, calibrations, known, Console())
+    return Task(instrument, order, workspace, bench, calibrations, known, Console())
 
 
 class RealCalibrationBench:

@@ -47,31 +47,33 @@ def loadcell(
         --reference "F1 set, cert. 456" --reference-u 0.002
     """
     from rig.calibrate.load_cell import COLUMNS, fit_load_cell
-    from rig.cli._calibration import new_job, numbers, order_of
+    from rig.cli._calibration import new_task, numbers, order_of
     from rig.experiment.calibration.procedures import LoadCellPlan, load_cell_points
     from rig.experiment.calibration.references import Standard
 
-    job = new_job("loadcell", order_of(locals()), lambda r: Standard("simulated masses", r.mass_u))
+    task = new_task(
+        "loadcell", order_of(locals()), lambda r: Standard("simulated masses", r.mass_u)
+    )
     plan = LoadCellPlan(numbers(masses, "masses"), cycles, creep_s)
-    capacity_g = job.bench.load_cell.capacity * 1e3
+    capacity_g = task.bench.load_cell.capacity * 1e3
     if max(plan.masses_g) > capacity_g:
         raise typer.BadParameter(f"the load cell carries {capacity_g:g} g at most")
-    rows = job.rows(
+    rows = task.rows(
         lambda bench, link, taken, stage: load_cell_points(bench, link, plan, taken, stage),
         COLUMNS,
     )
     fit = fit_load_cell(rows, gravity)
     made = fit.calibration(
         rows,
-        job.standard.u,
-        job.provenance(
+        task.standard.u,
+        task.provenance(
             f"masses up and down, buoyancy taken out, gravity {gravity:g} m/s2; least squares, "
             "line and parabola",
-            job.bench.load_cell.model,
+            task.bench.load_cell.model,
         ),
     )
     creep = "" if fit.creep is None else f"; creep {100 * fit.creep.share:+.2g} % of the load"
-    job.finish(
+    task.finish(
         made,
         (
             f"{made.counts_per_gram:.6g} counts per gram, u = {100 * made.counts_per_gram_u:.2g} %",

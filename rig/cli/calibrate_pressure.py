@@ -43,14 +43,16 @@ def pressure(
     import numpy as np
 
     from rig.calibrate.transducer import COLUMNS, fit_transducer
-    from rig.cli._calibration import new_job, order_of
+    from rig.cli._calibration import new_task, order_of
     from rig.experiment.calibration.procedures import PressurePlan, pressure_points
     from rig.experiment.calibration.references import Standard
 
-    job = new_job("pressure", order_of(locals()), lambda r: Standard("simulated gauge", r.gauge_u))
-    targets = np.linspace(job.top_kpa / steps, job.top_kpa, steps).round(3)
+    task = new_task(
+        "pressure", order_of(locals()), lambda r: Standard("simulated gauge", r.gauge_u)
+    )
+    targets = np.linspace(task.top_kpa / steps, task.top_kpa, steps).round(3)
     plan = PressurePlan(tuple(targets.tolist()), cycles)
-    rows = job.rows(
+    rows = task.rows(
         lambda bench, link, taken, stage: pressure_points(bench, link, plan, taken, stage),
         COLUMNS,
     )
@@ -58,11 +60,11 @@ def pressure(
     method = "reference gauge on the plugged tube" if points is None else f"points of {points.name}"
     made = fit.calibration(
         rows,
-        job.standard.u,
-        job.provenance(f"{method}; least squares, line and parabola", job.bench.transducer.model),
+        task.standard.u,
+        task.provenance(f"{method}; least squares, line and parabola", task.bench.transducer.model),
     )
     curve = fit.curve
-    job.finish(
+    task.finish(
         made,
         (
             f"gain {made.gain / 1e3:.5g} kPa/V, u = {100 * made.gain_u:.2g} %",

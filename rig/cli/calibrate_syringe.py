@@ -41,40 +41,40 @@ def syringe(
         --reference-u 0.01
     """
     from rig.calibrate.syringe import COLUMNS, Surroundings, fit_syringe
-    from rig.cli._calibration import new_job, order_of
+    from rig.cli._calibration import new_task, order_of
     from rig.experiment.calibration.procedures import SyringePlan, syringe_points
     from rig.experiment.calibration.references import Standard
 
-    job = new_job(
+    task = new_task(
         "syringe", order_of(locals()), lambda r: Standard("simulated balance", r.balance_u)
     )
-    syringe_ml = job.bench.syringe.volume * 1e6
+    syringe_ml = task.bench.syringe.volume * 1e6
     jogs = max(1, int(0.8 * syringe_ml / weighings / 1.5))
-    plan = SyringePlan(jogs, weighings, job.top_kpa)
-    rows = job.rows(
+    plan = SyringePlan(jogs, weighings, task.top_kpa)
+    rows = task.rows(
         lambda bench, link, taken, stage: syringe_points(bench, link, plan, taken, stage),
         COLUMNS,
     )
     around = Surroundings(
-        ambient_kpa=job.bench.ambient.pressure / 1e3,
-        temperature_c=job.temperature_c,
-        volume_per_step_ul=job.parameters["volume_per_step_ul"],
+        ambient_kpa=task.bench.ambient.pressure / 1e3,
+        temperature_c=task.temperature_c,
+        volume_per_step_ul=task.parameters["volume_per_step_ul"],
         syringe_ml=syringe_ml,
-        tube_ml=job.bench.tubing.volume * 1e6,
+        tube_ml=task.bench.tubing.volume * 1e6,
         tube_u_ml=tube_u_ml,
-        balance_u=job.standard.u,
-        pressure_u=job.calibrations.transducer.gain_u,
-        zero_u_kpa=job.calibrations.transducer.zero_u / 1e3,
+        balance_u=task.standard.u,
+        pressure_u=task.calibrations.transducer.gain_u,
+        zero_u_kpa=task.calibrations.transducer.zero_u / 1e3,
     )
     fit = fit_syringe(rows, around)
     made = fit.calibration(
         rows,
-        job.provenance(
+        task.provenance(
             "water weighed, then gas compressed behind a plug (Boyle's law); least squares",
             f"syringe of {syringe_ml:g} mL and its drive",
         ),
     )
-    job.finish(
+    task.finish(
         made,
         (
             f"{made.steps_per_ml:.6g} steps per mL, u = {100 * made.steps_per_ml_u:.2g} %",

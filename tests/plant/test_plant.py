@@ -360,10 +360,35 @@ def test_masses_load_the_cell_and_a_plug_shuts_the_actuator_out() -> None:
     assert plant.truth().actuator_pressure == pytest.approx(0.0, abs=1e-6)
 
 
+def test_a_load_cell_with_a_bow_shows_less_in_the_middle() -> None:
+    bent, straight = make(load_cell_bow=0.01), make()
+    for load, less in ((10.0, 0.01), (5.0, 0.0075), (20.0, 0.0)):  # of a span of 20 N
+        words = []
+        for plant in (bent, straight):
+            plant.set_cell_load(load)
+            words.append(plant.run(200).hx711_word)
+        assert words[1] - words[0] == pytest.approx(less * 2e5, abs=1)
+
+
 def test_zeros_drift_apart_by_as_much_as_stated() -> None:
-    changes = []
+    cell, transducer = [], []
     for seed in range(200):
-        plant = make(seed, load_cell_drift=0.01, drift_time=0.5, load_cell_zero_counts=1e5)
-        first = plant.run(101).hx711_word
-        changes.append((plant.run(5_000).hx711_word - first) / 2e5)
-    assert np.std(changes) == pytest.approx(0.01, rel=0.2)
+        plant = make(
+            seed,
+            load_cell_drift=0.01,
+            load_cell_zero_counts=1e5,
+            transducer_drift=1e3,
+            drift_time=0.5,
+        )
+
+        def read(plant: Plant = plant) -> tuple[float, float]:
+            pins = plant.run(101)
+            return pins.hx711_word / 2e5, pins.adc[0] * 5 / 1024 * 10e3
+
+        first = read()
+        plant.run(5_000)
+        last = read()
+        cell.append(last[0] - first[0])
+        transducer.append(last[1] - first[1])
+    assert np.std(cell) == pytest.approx(0.01, rel=0.2)
+    assert np.std(transducer) == pytest.approx(1e3, rel=0.2)
