@@ -92,7 +92,8 @@ class VirtualCalibrationBench:
             bench.ambient.temperature - CELSIUS,
             np.random.default_rng(seeds.references),
         )
-        self.bus = SlcanBus(board_on(bench, self.plant))
+        self.board = board_on(bench, self.plant)
+        self.bus = SlcanBus(self.board)
 
     def mount(self, fixture: Literal["free", "blocked", "plugged"]) -> None:
         """Arrange the bench."""

@@ -230,7 +230,7 @@ def examine(actuator: str, bench: str, seed: int) -> list[Finding]:
     except (LinkError, BoardError) as error:
         return [*findings, Finding("port or camera", "failed", advice=str(error))]
     try:
-        return findings + look_at_bench(opened, session.request)
+        return findings + look_at_bench(opened, session.request, date.today())
     finally:
         opened.close()
 

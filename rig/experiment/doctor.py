@@ -6,6 +6,7 @@ import contextlib
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from datetime import date
 from importlib import metadata
 from pathlib import Path
 from typing import Literal
@@ -14,11 +15,12 @@ import numpy as np
 
 from rig.errors import RigError
 from rig.experiment.bench import Bench
-from rig.experiment.setup import RunRequest
+from rig.experiment.setup import RunRequest, expired_calibrations
 from rig.experiment.sweep import cell_readings, pressures_kpa
 from rig.link.client import RigLink
 from rig.link.errors import LinkLostError
 from rig.link.schema import load_schema
+from rig.spec.workspace import BenchCalibrations
 from rig.vision.measure import AngleMeter
 
 Status = Literal["ok", "warning", "failed"]
@@ -59,17 +61,34 @@ def look_at_machine(logs: Path) -> list[Finding]:
     return [_packages(), _disk(logs)]
 
 
-def look_at_bench(bench: Bench, request: RunRequest) -> list[Finding]:
-    """Everything at the other end of the link; what fails leaves out what depends on it."""
+def look_at_bench(bench: Bench, request: RunRequest, today: date) -> list[Finding]:
+    """Everything at the other end of the link; what fails leaves out what depends on it.
+
+    `today` is for calibrations, which expire.
+    """
     link = RigLink(bench.bus)
     findings = [_try("firmware", lambda: _firmware(link))]
     if findings[0].status != "failed":
         link.raise_faults(False)
         findings.append(_try("link", lambda: _latency(link)))
         findings.append(_try("parameters", lambda: _parameters(link, request)))
+    findings.append(_calibrations(request.setup.calibrations, today))
+    if findings[0].status != "failed":
         findings += _try_all("sensors", lambda: _at_rest(link))
     findings.append(_try("camera", lambda: _camera(bench, request)))
     return findings
+
+
+def _calibrations(calibrations: BenchCalibrations, today: date) -> Finding:
+    why = expired_calibrations(calibrations, today)
+    days = {
+        role.replace("_", " "): str(calibration.provenance.valid_until or "no end stated")
+        for role, calibration in calibrations.by_role().items()
+    }
+    if why is None:
+        return Finding("calibrations", "ok", dict(days))
+    advice = f"{why[0].upper()}{why[1:]} Calibrate again; runs refuse it until then."
+    return Finding("calibrations", "failed", dict(days), advice)
 
 
 def _try(what: str, look: Callable[[], Finding]) -> Finding:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from datetime import date, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +16,22 @@ from rig.spec.faults import Expectation, FaultScript
 
 from .conftest import make_request
 
+TODAY = date(2026, 1, 31)
 
-def examined(*faults: dict[str, Any], camera: CameraFault | None = None) -> dict[str, Finding]:
+
+def examined(
+    *faults: dict[str, Any],
+    camera: CameraFault | None = None,
+    valid_until: date | None = None,
+    today: date = TODAY,
+) -> dict[str, Finding]:
     request = make_request()
+    if valid_until is not None:
+        cell = request.setup.calibrations.load_cell
+        provenance = cell.provenance.model_copy(update={"valid_until": valid_until})
+        cell = cell.model_copy(update={"provenance": provenance})
+        calibrations = replace(request.setup.calibrations, load_cell=cell)
+        request = replace(request, setup=replace(request.setup, calibrations=calibrations))
     script = FaultScript.model_validate(
         {
             "kind": "faults",
@@ -30,7 +45,7 @@ def examined(*faults: dict[str, Any], camera: CameraFault | None = None) -> dict
     if camera is not None:
         bench.camera.fault = camera
     try:
-        return {finding.what: finding for finding in look_at_bench(bench, request)}
+        return {finding.what: finding for finding in look_at_bench(bench, request, today)}
     finally:
         bench.close()
 
@@ -42,6 +57,7 @@ def test_a_sound_bench_is_found_sound_and_still() -> None:
         "firmware",
         "link",
         "parameters",
+        "calibrations",
         "board",
         "switches",
         "pressure",
@@ -68,6 +84,15 @@ def test_what_is_broken_is_found(fault: dict[str, Any], what: str, status: str) 
     finding = examined(fault)[what]
     assert finding.status == status
     assert finding.advice
+
+
+def test_an_expired_calibration_is_found() -> None:
+    yesterday = TODAY - timedelta(days=1)
+    finding = examined(valid_until=yesterday)["calibrations"]
+    assert finding.status == "failed"
+    assert finding.seen["load cell"] == str(yesterday)
+    assert "load cell" in finding.advice
+    assert examined(valid_until=TODAY)["calibrations"].status == "ok"
 
 
 def test_both_switches_at_once_are_a_broken_wire() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from datetime import date
 
 import pytest
 
@@ -18,6 +19,7 @@ from rig.experiment.prepare import (
 from rig.experiment.sweep import go_to, settle
 from rig.link.client import RigLink
 from rig.link.errors import CommandRefusedError
+from rig.spec.calibration import Provenance, SyringeCalibration
 from rig.spec.protocol import Settling
 
 from .conftest import make_request
@@ -96,6 +98,27 @@ def test_what_the_board_would_refuse_is_refused_before_it_is_asked() -> None:
         "controller.deadband: it makes the board's deadband_kpa 5; the board takes 0 to 1" in said
     )
     assert "safety.communication_timeout" in said
+
+
+def test_a_calibrated_drive_replaces_the_drawing() -> None:
+    request = make_request()
+    drawn = request.board_parameters()
+    syringe = SyringeCalibration(  # bare numbers are in mL
+        kind="calibration",
+        instrument="syringe",
+        steps_per_ml=3000.0,
+        steps_per_ml_u=0.0,
+        backlash=0.01,
+        backlash_u=0.0,
+        dead_volume=2.5,
+        dead_volume_u=0.0,
+        provenance=Provenance(date=date(2026, 1, 1), method="test", instrument="none"),
+    )
+    calibrations = replace(request.setup.calibrations, syringe=syringe)
+    known = replace(request, setup=replace(request.setup, calibrations=calibrations))
+    parameters = known.board_parameters()
+    assert parameters["volume_per_step_ul"] == pytest.approx(1 / 3)
+    assert parameters["system_volume_ml"] - drawn["system_volume_ml"] == pytest.approx(0.5)
 
 
 def test_a_refusal_of_the_board_names_the_field_of_the_bench() -> None:

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -242,6 +243,15 @@ class StopsAfter(Nobody):
     def check(self) -> None:
         if self._left <= 0:
             raise AbortedError("stopped on request.")
+
+
+def test_what_a_run_was_cautioned_of_is_a_warning_in_its_log(tmp_path: Path) -> None:
+    stopper = StopsAfter(1)
+    request = replace(make_request(), cautions=("the calibration of load cell has expired",))
+    run = take(tmp_path / "run", request, observer=stopper, interrupted=stopper.check)
+    (warning,) = (event for event in run.reader.events() if event.name == "caution")
+    assert warning.level == "warning"
+    assert warning.data == {"what": "the calibration of load cell has expired"}
 
 
 def test_an_interrupted_run_is_vented_readable_and_resumable(

@@ -24,7 +24,7 @@ from rig.report import build
 from rig.report.build import build_report
 from rig.report.charts import MAX_COLUMNS, envelope
 from rig.report.errors import ReportError
-from rig.report.words import decimals_for, duration, number, significant, uncertain
+from rig.report.words import decimals_for, duration, freedom, number, significant, uncertain
 
 NAMESPACES = ("http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink")
 
@@ -230,6 +230,18 @@ def test_a_model_that_cannot_predict_is_a_note_not_an_end(
     assert "ends at 3 kPa &lt;here&gt;" in page.text
 
 
+def test_the_page_shows_whole_budgets(tmp_path: Path, run_folder: Path) -> None:
+    summary = build_report(tmp_path / "out", RunReader(run_folder))
+    page = (tmp_path / "out" / "report.html").read_text()
+    levels = [level for e in summary.experiments.values() for level in e.points]
+    # one of the value and one of the pressure at each level, closed but for the highest
+    assert page.count("expanded for 95 %, k = ") == 2 * len(levels)
+    assert page.count("combined standard uncertainty") == 2 * len(levels)
+    for heading in ("distribution", "sensitivity", "contribution", "type"):
+        assert page.count(f">{heading}") >= len(levels)
+    assert page.count("<summary>Budgets at the other pressures</summary>") == 2
+
+
 def test_a_folder_without_a_run_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RecordError, match="no readable run"):
         build_report(tmp_path)
@@ -283,4 +295,5 @@ def test_numbers_in_words() -> None:
     assert significant(1234.5) == "1234"
     assert significant(0) == "0"
     assert significant(1.5e-7, 2) == "1.5e−07"
+    assert [freedom(d) for d in (None, 4.99, 1.0, 3e7)] == ["∞", "4", "1", "∞"]
     assert [duration(s) for s in (50, 600, 9000)] == ["50 s", "10 min", "2.5 h"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from datetime import date, timedelta
 from pathlib import Path
 
 import pytest
@@ -181,3 +182,46 @@ def test_specs_are_frozen(lab: Path) -> None:
     spec = load(lab / "models/materials/agilus30.yaml")
     with pytest.raises(ValueError, match="frozen"):
         spec.kind = "bench"  # type: ignore[assignment,union-attr]
+
+
+SYRINGE = """
+kind: calibration
+instrument: syringe
+steps_per_ml: 2850
+steps_per_ml_u: 0.02 %
+backlash: 0.011 mL
+backlash_u: 0.001 mL
+dead_volume: 2.1 mL
+dead_volume_u: 0.06 mL
+provenance: {date: 2026-01-31, valid_until: 2027-01-31, method: water, instrument: BD 60 mL}
+"""
+
+
+def test_a_calibrated_syringe_travels_with_the_set_up(lab: Path) -> None:
+    (lab / "calibration" / "syringe-mine.yaml").write_text(SYRINGE)
+    bench = lab / "models" / "benches" / "virtual-beam.yaml"
+    assert Workspace(lab).setup("bellow-bending", "virtual-beam").calibrations.syringe is None
+    edit(bench, "  dead_volume: 2 mL ", "  calibration: syringe-mine\n  dead_volume: 2 mL ")
+    setup = Workspace(lab).setup("bellow-bending", "virtual-beam")
+    assert setup.calibrations.syringe is not None
+    assert setup.calibrations.syringe.steps_per_ml == 2850
+    attached = setup.attachments()
+    assert attached["syringe.yaml"] == SYRINGE
+    assert Setup.from_attachments(attached, lab).calibrations == setup.calibrations
+
+
+def test_calibrations_expire_on_the_day_after_their_last(lab: Path) -> None:
+    (lab / "calibration" / "syringe-mine.yaml").write_text(SYRINGE)
+    bench = lab / "models" / "benches" / "virtual-beam.yaml"
+    edit(bench, "  dead_volume: 2 mL ", "  calibration: syringe-mine\n  dead_volume: 2 mL ")
+    calibrations = Workspace(lab).setup("bellow-bending", "virtual-beam").calibrations
+    last = date(2027, 1, 31)
+    assert calibrations.expired(last) == {}
+    assert calibrations.expired(last + timedelta(days=1)) == {"syringe": last}
+
+
+def test_a_calibration_does_not_end_before_it_begins(lab: Path) -> None:
+    path = lab / "calibration" / "syringe-mine.yaml"
+    path.write_text(SYRINGE.replace("2027-01-31", "2025-01-31"))
+    with pytest.raises(SpecError, match="valid_until not before date"):
+        load(path)
