@@ -22,6 +22,7 @@ from rig.spec.errors import Problem, SpecError
 from rig.spec.explain import did_you_mean, one_of, problems_of
 from rig.spec.faults import FaultScript
 from rig.spec.material import MaterialSpec
+from rig.spec.optimisation import OptimisationSpec
 from rig.spec.protocol import ProtocolSpec
 from rig.spec.published import PublishedReference
 from rig.spec.study import StudySpec
@@ -42,6 +43,7 @@ AnySpec = (
     | FaultScript
     | PublishedReference
     | StudySpec
+    | OptimisationSpec
     | AnyCalibration
 )
 
@@ -53,6 +55,7 @@ KINDS: dict[str, type[BaseModel]] = {
     "faults": FaultScript,
     "published": PublishedReference,
     "study": StudySpec,
+    "optimisation": OptimisationSpec,
 }
 """Model of each `kind`, but for `calibration`, which depends on its `instrument`."""
 

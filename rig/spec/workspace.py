@@ -40,6 +40,7 @@ FOLDERS: dict[str, str] = {
     "faults": "models/faults",
     "published": "models/published",
     "study": "models/studies",
+    "optimisation": "models/optimisations",
     "calibration": "calibration",
 }
 """Where a workspace keeps the files of each kind."""

@@ -25,7 +25,7 @@ def beam_model(plan: Plan, response: str) -> Model:
 
     def answers(points: Array) -> Array:
         values = {f.name: points[:, i] for i, f in enumerate(plan.factors)}
-        beams = ManyBeams.of(plan.actuator, plan.material, plan.fields, values)
+        beams = ManyBeams.of(plan.space.actuator, plan.space.material, plan.fields, values)
         return np.degrees(beams.angle(one.pressure))
 
     return answers

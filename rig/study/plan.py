@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from rig.mechanics.store import content_key
 from rig.spec.actuator import ActuatorSpec
-from rig.spec.loading import Loaded, read
+from rig.spec.loading import read
 from rig.spec.material import MaterialSpec
-from rig.spec.study import StudyResponse, StudySpec
+from rig.spec.study import StudyFactor, StudyResponse, StudySpec
 from rig.spec.workspace import Workspace
 from rig.study.design import coded_points
 from rig.study.errors import StudyError
@@ -31,6 +29,22 @@ class Task:
     runs: Path | None
     """Folder of recorded runs; the point's is called as the point."""
 
+    @property
+    def key(self) -> str:
+        """Of everything that an answer depends on, the code that answers included.
+
+        Runs answer for the point's name, models for its spec alone, so that replicates share an
+        answer.
+        """
+        of_run = any(one.model == "run" for one in self.responses)
+        asked = {"name", "quantity", "model", "pressure"}
+        return content_key(
+            actuator=self.actuator.model_dump(mode="json"),
+            material=self.material.model_dump(mode="json"),
+            responses=[one.model_dump(mode="json", include=asked) for one in self.responses],
+            run=_stamp(self) if of_run else None,
+        )
+
 
 @dataclass(frozen=True)
 class Point:
@@ -47,23 +61,72 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Plan:
-    """A study, resolved."""
+class Space:
+    """An actuator of which some fields vary, and what is asked of it."""
 
-    spec: StudySpec
-    text: str
-    """Of its file."""
     actuator: ActuatorSpec
     material: MaterialSpec
     fields: Mapping[str, NumericField]
     """Factor to field."""
     factors: tuple[Factor, ...]
     """With levels in SI, in the order of the file."""
-    points: tuple[Point, ...]
+    responses: tuple[StudyResponse, ...]
+    runs: Path | None = None
 
     def in_lab_units(self, factor: str, value: float) -> float:
         """An SI value of a factor in its lab unit."""
         return self.fields[factor].to_lab(value)
+
+    def point(self, name: str, row: Sequence[float]) -> Point:
+        """The point with SI values `row` of the factors; without a task where that is no spec."""
+        values = {
+            factor: float(round(value)) if field.whole else float(value)
+            for (factor, field), value in zip(self.fields.items(), row, strict=True)
+        }
+
+        def of(root: str) -> dict[tuple[str, ...], float]:
+            return {
+                field.path: int(values[factor]) if field.whole else values[factor]
+                for factor, field in self.fields.items()
+                if field.root == root
+            }
+
+        try:
+            task = Task(
+                name,
+                with_values(self.actuator, of("actuator")),
+                with_values(self.material, of("material")),
+                self.responses,
+                self.runs,
+            )
+        except StudyError as error:
+            return Point(name, values, None, "", str(error))
+        return Point(name, values, task, task.key)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A study, resolved."""
+
+    spec: StudySpec
+    text: str
+    """Of its file."""
+    space: Space
+    points: tuple[Point, ...]
+
+    @property
+    def factors(self) -> tuple[Factor, ...]:
+        """With levels in SI, in the order of the file."""
+        return self.space.factors
+
+    @property
+    def fields(self) -> Mapping[str, NumericField]:
+        """Factor to field."""
+        return self.space.fields
+
+    def in_lab_units(self, factor: str, value: float) -> float:
+        """An SI value of a factor in its lab unit."""
+        return self.space.in_lab_units(factor, value)
 
 
 def make_plan(path: Path, workspace: Workspace) -> Plan:
@@ -71,85 +134,37 @@ def make_plan(path: Path, workspace: Workspace) -> Plan:
     levels that cannot be, and designs that cannot be made."""
     source = read(path, StudySpec)
     spec = source.spec
-    drawing = read(workspace.path("actuator", spec.actuator, beside=path.parent), ActuatorSpec)
-    material = workspace.resolve_actuator(drawing).spec
-    fields, factors = _factors(path, spec, drawing, material)
-    coded = coded_points(spec.design, len(factors))
     runs = None if spec.runs is None else path.parent / spec.runs
-    levels = actual(factors, coded)
+    space = make_space(path, workspace, spec.actuator, spec.factors, spec.responses, runs)
+    levels = actual(space.factors, coded_points(spec.design, len(space.factors)))
     width = len(str(len(levels)))
-    points = tuple(
-        _point(spec, f"{i:0{width}d}", row, fields, drawing.spec, material, runs)
-        for i, row in enumerate(levels, 1)
-    )
+    points = tuple(space.point(f"{i:0{width}d}", row) for i, row in enumerate(levels.tolist(), 1))
     if all(point.task is None for point in points):
         raise StudyError(f"{path}: no point of the design is a valid spec: {points[0].error}")
-    return Plan(spec, source.text, drawing.spec, material, fields, factors, points)
+    return Plan(spec, source.text, space, points)
 
 
-def _factors(
-    path: Path, spec: StudySpec, drawing: Loaded[ActuatorSpec], material: MaterialSpec
-) -> tuple[dict[str, NumericField], tuple[Factor, ...]]:
-    fields, factors = {}, []
-    for one in spec.factors:
+def make_space(
+    path: Path,
+    workspace: Workspace,
+    actuator: str,
+    factors: Sequence[StudyFactor],
+    responses: Sequence[StudyResponse],
+    runs: Path | None = None,
+) -> Space:
+    """The space that a file at `path` describes; raises SpecError and StudyError."""
+    drawing = read(workspace.path("actuator", actuator, beside=path.parent), ActuatorSpec)
+    material = workspace.resolve_actuator(drawing).spec
+    fields: dict[str, NumericField] = {}
+    levels = []
+    for one in factors:
         try:
             field = numeric_field(one.field, drawing.spec, material)
-            factors.append(Factor(one.name, field.parse(one.low), field.parse(one.high)))
+            levels.append(Factor(one.name, field.parse(one.low), field.parse(one.high)))
         except StudyError as error:
             raise StudyError(f"{path}: factor '{one.name}': {error}") from None
         fields[one.name] = field
-    return fields, tuple(factors)
-
-
-def _point(
-    spec: StudySpec,
-    name: str,
-    row: np.ndarray,
-    fields: Mapping[str, NumericField],
-    actuator: ActuatorSpec,
-    material: MaterialSpec,
-    runs: Path | None,
-) -> Point:
-    values = {
-        factor: float(round(value)) if field.whole else float(value)
-        for (factor, field), value in zip(fields.items(), row.tolist(), strict=True)
-    }
-
-    def of(root: str) -> dict[tuple[str, ...], float]:
-        return {
-            field.path: int(values[factor]) if field.whole else values[factor]
-            for factor, field in fields.items()
-            if field.root == root
-        }
-
-    try:
-        task = Task(
-            name,
-            with_values(actuator, of("actuator")),
-            with_values(material, of("material")),
-            spec.responses,
-            runs,
-        )
-    except StudyError as error:
-        return Point(name, values, None, "", str(error))
-    return Point(name, values, task, _key(task))
-
-
-def _key(task: Task) -> str:
-    """Of everything that an answer depends on, the code that answers included.
-
-    Runs answer for the point's name, models for its spec alone, so that replicates share an answer.
-    """
-    of_run = any(one.model == "run" for one in task.responses)
-    return content_key(
-        actuator=task.actuator.model_dump(mode="json"),
-        material=task.material.model_dump(mode="json"),
-        responses=[
-            one.model_dump(mode="json", include={"name", "quantity", "model", "pressure"})
-            for one in task.responses
-        ],
-        run=_stamp(task) if of_run else None,
-    )
+    return Space(drawing.spec, material, fields, tuple(levels), tuple(responses), runs)
 
 
 def _stamp(task: Task) -> str:

@@ -14,7 +14,7 @@ from typing import Any
 from rig import __version__
 from rig.study.errors import StudyError
 from rig.study.evaluate import UNITS
-from rig.study.plan import Plan, Point
+from rig.study.plan import Plan, Point, Space, Task
 
 RESULTS, MANIFEST, ANSWERS = "results.parquet", "manifest.json", "answers"
 
@@ -80,6 +80,30 @@ class Folder:
                 f"results cannot be written to {path}: {error.strerror}. Name a folder that you "
                 f"may write to, on a disk with room."
             ) from None
+
+
+def write_specs(folder: Path, name: str, task: Task, space: Space) -> None:
+    """A point's actuator as NAME.yaml, and its material beside it where that differs.
+
+    Raises StudyError where they cannot be written.
+    """
+    actuator = task.actuator.model_dump(mode="json", exclude_none=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if task.material != space.material:
+            material = task.material.model_dump(mode="json", exclude_none=True)
+            _write_yaml(folder / f"{name}-material.yaml", material)
+            actuator["material"] = f"./{name}-material.yaml"
+        _write_yaml(folder / f"{name}.yaml", {**actuator, "name": f"{task.actuator.name}-{name}"})
+    except OSError as error:
+        raise StudyError(f"specs cannot be written to {folder}: {error.strerror}.") from None
+
+
+def _write_yaml(path: Path, data: dict[str, Any]) -> None:
+    from ruamel.yaml import YAML
+
+    with path.open("w", encoding="utf-8") as file:
+        YAML().dump(data, file)
 
 
 def columns(plan: Plan, answers: Sequence[tuple[Point, Answer]]) -> dict[str, list[Any]]:

@@ -1,0 +1,82 @@
+"""Optimisation files: what may change, what is wanted of the responses, and how to search."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from rig.spec.base import Count, Integer, Name, Number, SpecModel, require
+from rig.spec.study import StudyFactor, StudyResponse
+
+
+class WantedResponse(StudyResponse):
+    """A response with a goal, a target or limits."""
+
+    target: Number | None = Field(None, description="deg, mm, g, mL or kPa")
+
+    @model_validator(mode="after")
+    def _one_wish(self) -> WantedResponse:
+        require(self.goal is None or self.target is None, "expected 'goal' or 'target', not both")
+        require(self.model != "run", "expected a model; runs cannot be searched")
+        return self
+
+    @property
+    def is_objective(self) -> bool:
+        """Whether it is more than a limit."""
+        return self.goal is not None or self.target is not None
+
+
+class CobylaSearch(SpecModel):
+    """COBYLA with basin hopping from several starting points; one objective."""
+
+    kind: Literal["cobyla"]
+    starts: Count = 4
+    hops: Integer = Field(3, ge=0)
+    evaluations: Count = Field(60, description="most of one descent")
+    seed: Integer = Field(0, ge=0)
+
+
+class NsgaSearch(SpecModel):
+    """NSGA-II; two objectives or more, or one."""
+
+    kind: Literal["nsga2"]
+    population: Integer = Field(40, ge=8)
+    generations: Count = 30
+    seed: Integer = Field(0, ge=0)
+
+
+class BayesianSearch(SpecModel):
+    """Tree-structured Parzen estimators, for answers that are dear; one objective."""
+
+    kind: Literal["bayesian"]
+    evaluations: Count = 40
+    seed: Integer = Field(0, ge=0)
+
+
+Search = Annotated[CobylaSearch | NsgaSearch | BayesianSearch, Field(discriminator="kind")]
+
+
+class OptimisationSpec(SpecModel):
+    """A search over fields of an actuator and its material; levels of the factors are bounds."""
+
+    kind: Literal["optimisation"]
+    name: Name
+    description: str = ""
+    actuator: str = Field(description="name of a file in models/actuators, or a path")
+    factors: tuple[StudyFactor, ...] = Field(min_length=1)
+    responses: tuple[WantedResponse, ...] = Field(min_length=1)
+    search: Search
+
+    @model_validator(mode="after")
+    def _consistent(self) -> OptimisationSpec:
+        for what in ("factors", "responses"):
+            names = [one.name for one in getattr(self, what)]
+            require(len(set(names)) == len(names), f"expected {what} of different names")
+        objectives = sum(one.is_objective for one in self.responses)
+        require(objectives > 0, "expected a response with a 'goal' or a 'target'")
+        require(
+            objectives == 1 or self.search.kind == "nsga2",
+            f"{objectives} objectives need the search 'nsga2'; give the others limits instead",
+        )
+        return self
