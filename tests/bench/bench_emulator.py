@@ -91,7 +91,7 @@ def stretches() -> list[Stretch]:
     jog = m.stretch("jog at 10 kHz", 2.0, m.jog)
     m.link.command("vent")
     m.link.await_state("idle", 30.0)
-    m.link.write_parameter("setpoint_rate_kpa_s", 3.2)
+    m.link.write_parameter("setpoint_rate_kpa_s", 3.65)
     m.link.command("set_pressure", 10.0)
     m.link.wait(0.5)
     ramp = m.stretch("run, rising", 2.0, m.nothing)

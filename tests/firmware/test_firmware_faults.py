@@ -333,6 +333,22 @@ def test_a_motor_that_stalls_under_regulation_cannot_run_on() -> None:
     assert board.fault == "leak"  # the plunger moves, pressure does not
 
 
+def test_noise_at_the_transducer_is_no_rise_that_a_leak_is_measured_against() -> None:
+    board = Board().ready()
+    board.write(leak_volume_ml=1.0)
+    board.at(4.0)
+    before_ml = board.bench.plunger_ml
+    board.command("set_pressure", 8.0)
+    board.run(500)
+    board.bench.offset_kpa = 3.0
+    board.run(3)
+    board.bench.offset_kpa = 0.0
+    board.run(4000)
+    assert board.state == "run"
+    assert board.bench.pressure_kpa == pytest.approx(8.0, abs=0.1)
+    assert board.bench.plunger_ml - before_ml > 1.5
+
+
 def test_a_home_switch_closed_far_from_home_is_a_travel_fault() -> None:
     board = Board().at(5.0)
     board.bench.home_switch_stuck = 1

@@ -66,6 +66,13 @@ def test_a_word_shifted_by_a_lost_clock_is_doubted_and_the_next_good_one_trusted
     assert judged([load, load + 7, 2 * load + 1, load - 5]) == [OK, OK, DESYNC, OK]
 
 
+def test_noise_hides_no_shifted_word() -> None:
+    rng = np.random.default_rng(5)
+    counts = (18_800 + rng.normal(0, 100, 4000)).round().astype(int)
+    counts[1::2] = 2 * counts[1::2] + 1
+    assert judged(counts.tolist()) == [OK, DESYNC] * 2000
+
+
 @pytest.mark.parametrize("word", [0x000000, 0xFFFFFF])
 def test_a_dead_data_line_is_no_reading(word: int) -> None:
     assert judged([LOAD, word, word]) == [OK, DESYNC, DESYNC]

@@ -30,10 +30,11 @@ bool Hx711::is_dead_line(uint32_t word) const {
   return (word == kMask || word == 0) && have_good_ && apart(good_, 0, kNearZero);
 }
 
-// A lost clock edge shifts the word by one and a one follows: twice the true value plus one.
+// A lost clock edge shifts the word by one and a one follows: twice the true value plus one, and
+// twice the noise of both words, which must not hide it.
 bool Hx711::is_shifted(int32_t counts) const {
   if (!have_good_ || (counts & 1) == 0 || !apart(good_, 0, 2 * kNearZero)) return false;
-  const int32_t tolerance = kNearZero + (good_ < 0 ? -good_ : good_) / 64;
+  const int32_t tolerance = kNearZero + (good_ < 0 ? -good_ : good_) / 16;
   return !apart(counts, 2 * good_ + 1, tolerance);
 }
 

@@ -75,9 +75,8 @@ Flow PlungerMotion::wanted() const {
   if (mode_ == Mode::kVelocity) return clamp(target_velocity_, -max_flow_, max_flow_);
   const Volume left = target_ - position();
   if (magnitude(left) <= per_step_ * 0.5f) return {};
-  Flow speed = braking(magnitude(left));
-  if (speed > speed_) speed = speed_;
-  if (speed > max_flow_) speed = max_flow_;
+  const Flow fastest = clamp(speed_, Flow{}, max_flow_);
+  const Flow speed = clamp(braking(magnitude(left)), Flow{}, fastest);
   return left < Volume{} ? -speed : speed;
 }
 
@@ -101,9 +100,9 @@ Flow PlungerMotion::within_travel(Flow wanted) {
 StepSchedule PlungerMotion::tick() {
   const Flow goal = within_travel(wanted());
   velocity_ += clamp(goal - velocity_, -change_, change_);
+  if (!moving()) return kNoSteps;
   const float travel = to_ml_s(velocity_) * tick_steps_per_flow_;
-  if (!(travel < 0) && !(travel > 0)) return kNoSteps;
-  const bool inward = travel > 0;
+  const bool inward = velocity_ > Flow{};
   const float phase = inward ? fraction_ : -fraction_;
   const float end = fraction_ + travel;
   const int32_t whole = static_cast<int32_t>(end);  // towards zero

@@ -27,13 +27,20 @@ void Transducer::configure(const Parameters &parameters) {
   offset_ = offset;
   reference_ = reference;
   volts_per_count_ = to_volts(reference) / kAdcCounts;
+  scales_[0] = scales_[1] = {};
   find_zero();
+}
+
+float Transducer::volts_per_sum(uint8_t count) {
+  Scale &scale = scales_[count % 2];
+  if (scale.count != count) scale = {count, volts_per_count_ / static_cast<float>(count)};
+  return scale.volts;
 }
 
 void Transducer::sample(uint32_t sum, uint8_t count) {
   if (count != 0) {
-    const float mean = static_cast<float>(sum) / static_cast<float>(count);
-    tick_ = volts((mean + kHalfCount) * volts_per_count_);
+    const float mean_volts = static_cast<float>(sum) * volts_per_sum(count);
+    tick_ = volts(mean_volts + kHalfCount * volts_per_count_);
   }
   if (!filled_ && count != 0) {
     for (Voltage &v : recent_) v = tick_;

@@ -40,6 +40,8 @@ class Transducer {
     return kpa(gain_kpa_v_ * to_volts(voltage)) - zero_;
   }
 
+  float volts_per_sum(uint8_t count);
+
   static constexpr uint8_t kFilterTicks = 4;
   static constexpr uint8_t kRateTicks = 8;
 
@@ -47,6 +49,13 @@ class Transducer {
   float rate_gain_kpa_s_v_ = 1;  // of a change over the history
   Voltage reference_ = {};
   float volts_per_count_ = 0;
+  // Of a tick's sum, by its number of conversions: that changes between two neighbours, and a
+  // division takes the Mega as long as four products.
+  struct Scale {
+    uint8_t count;
+    float volts;
+  };
+  Scale scales_[2] = {};
   Voltage offset_ = {};
   Voltage shift_ = {};
   Pressure zero_ = {};  // what offset and shift amount to

@@ -3,7 +3,19 @@
 // or leaves (RespiraWorks' units.h is the model).
 #pragma once
 
+#include <stdint.h>
+#include <string.h>
+
 namespace rig {
+
+// A whole number that compares as the float does: IEEE 754 numbers are in order of their bits, but
+// for the sign. The Mega compares whole numbers in a third of the time. Both zeros are equal.
+inline int32_t ordered(float value) {
+  static_assert(sizeof(float) == sizeof(int32_t), "IEEE 754, single precision");
+  int32_t bits = 0;
+  memcpy(&bits, &value, sizeof bits);
+  return bits < 0 ? INT32_MIN - bits : bits;
+}
 
 template <typename Tag>
 struct Quantity {
@@ -15,10 +27,10 @@ struct Quantity {
   friend constexpr Quantity operator*(Quantity a, float k) { return {a.value * k}; }
   friend constexpr Quantity operator/(Quantity a, float k) { return {a.value / k}; }
   friend constexpr float operator/(Quantity a, Quantity b) { return a.value / b.value; }
-  friend constexpr bool operator<(Quantity a, Quantity b) { return a.value < b.value; }
-  friend constexpr bool operator>(Quantity a, Quantity b) { return a.value > b.value; }
-  friend constexpr bool operator<=(Quantity a, Quantity b) { return a.value <= b.value; }
-  friend constexpr bool operator>=(Quantity a, Quantity b) { return a.value >= b.value; }
+  friend bool operator<(Quantity a, Quantity b) { return ordered(a.value) < ordered(b.value); }
+  friend bool operator>(Quantity a, Quantity b) { return ordered(a.value) > ordered(b.value); }
+  friend bool operator<=(Quantity a, Quantity b) { return ordered(a.value) <= ordered(b.value); }
+  friend bool operator>=(Quantity a, Quantity b) { return ordered(a.value) >= ordered(b.value); }
   Quantity &operator+=(Quantity b) {
     value += b.value;
     return *this;
@@ -53,12 +65,12 @@ constexpr Flow operator*(FlowAcceleration a, Duration t) { return ml_s(a.value *
 constexpr Pressure operator*(PressureRate r, Duration t) { return kpa(r.value * t.value); }
 
 template <typename Q>
-constexpr Q clamp(Q x, Q low, Q high) {
+Q clamp(Q x, Q low, Q high) {
   return x < low ? low : (x > high ? high : x);
 }
 
 template <typename Q>
-constexpr Q magnitude(Q x) {
+Q magnitude(Q x) {
   return x < Q{} ? -x : x;
 }
 

@@ -14,11 +14,12 @@ namespace {
 
 // A compare value this close ahead of the counter, or behind it, would be missed for 32 ms.
 constexpr int16_t kSoonest = 8;
+// Drivers want a pulse 2 us long; working out when the next one is due takes as long.
+constexpr uint32_t kPulseRest = 16;
 
 StepSchedule planned = kNoSteps;
 StepSchedule running = kNoSteps;  // `count` is what is left
 uint8_t step_fraction;           // of a timer tick, by which the next step is due later
-volatile uint8_t ticks_waiting;
 TickSample sample_waiting;
 
 int16_t signed_steps(const StepSchedule &schedule) {
@@ -43,6 +44,8 @@ void step_at(uint16_t when) {
 
 }  // namespace
 
+volatile uint8_t ticks_waiting;
+
 void pacemaker_begin() {
   TCCR1A = 0;
   TCCR1B = _BV(CS11);  // 16 MHz / 8, no wave form
@@ -50,8 +53,6 @@ void pacemaker_begin() {
   TIFR1 = _BV(OCF1A) | _BV(OCF1B);
   TIMSK1 = _BV(OCIE1B);
 }
-
-bool tick_waiting() { return ticks_waiting != 0; }
 
 bool tick_due(TickSample &sample) {
   bool due = false;
@@ -98,13 +99,13 @@ ISR(TIMER1_COMPA_vect) {
   running.count = left;
   if (left == 0) {
     TIMSK1 &= static_cast<uint8_t>(~_BV(OCIE1A));
+    __builtin_avr_delay_cycles(kPulseRest);
   } else {
     const uint8_t before = step_fraction;
     step_fraction = static_cast<uint8_t>(before + (running.interval & 0xFF));
     const uint16_t interval = static_cast<uint16_t>(running.interval >> 8);
     step_at(static_cast<uint16_t>(OCR1A + interval + (step_fraction < before ? 1 : 0)));
   }
-  __builtin_avr_delay_cycles(16);  // drivers want the pulse 2 us long
   PORTA &= static_cast<uint8_t>(~kStep);
 }
 

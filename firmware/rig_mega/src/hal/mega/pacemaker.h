@@ -16,7 +16,9 @@ struct TickSample {
 
 void pacemaker_begin();
 
-bool tick_waiting();
+extern volatile uint8_t ticks_waiting;
+// Asked after every interrupt, so without a call.
+inline bool tick_waiting() { return ticks_waiting != 0; }
 
 // True once for each tick, with the conversions made during it.
 bool tick_due(TickSample &sample);
