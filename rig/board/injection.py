@@ -23,6 +23,7 @@ from rig.spec.faults import (
     EmergencyStop,
     Leak,
     LoadCellBadWords,
+    LoadCellReversed,
     LoadCellSilent,
     LoadCellStuck,
     MotorFault,
@@ -240,7 +241,9 @@ def plant_faults(faults: Sequence[AnyFault]) -> Faults:
     """The state of a plant that has all these faults; faults of line and board leave no trace."""
     changes: dict[str, float] = {}
     for fault in faults:
-        if isinstance(fault, SensorFault | TubeFault | EmergencyStop | LoadCellSilent):
+        if isinstance(
+            fault, SensorFault | TubeFault | EmergencyStop | LoadCellSilent | LoadCellReversed
+        ):
             changes[fault.kind] = True
         elif isinstance(fault, SensorSpike):
             changes["spike_voltage"] = fault.voltage

@@ -12,7 +12,8 @@ HINTS: dict[str, str] = {
     "rate_implausible": "The pressure changed faster than the plunger can cause: look for "
     "a burst actuator, a tube that came off, or electrical noise.",
     "leak": "The plunger had to push this much more air to hold the pressure: look for a leak "
-    "at the actuator, the tube or the valve.",
+    "at the actuator, the tube or the valve. If there is none, the transducer does not follow the "
+    "pressure, and the last points of this run are not to be trusted.",
     "travel_limit": "The plunger reached the end of its travel, or a limit switch closed "
     "where it should not: the system holds more air than the syringe can compress, or the "
     "plunger lost steps; look for a leak, a stalled motor, or use a larger syringe.",

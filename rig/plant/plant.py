@@ -64,6 +64,7 @@ class Faults:
     tube_blocked: bool = False
     home_switch: Switch = Switch.LIVE
     end_switch: Switch = Switch.LIVE
+    load_cell_reversed: bool = False
     hx711_silent: bool = False
     hx711_stuck: bool = False
     hx711_word: int = 0

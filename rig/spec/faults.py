@@ -107,6 +107,12 @@ class LoadCellSilent(Fault):
     kind: Literal["hx711_silent"]
 
 
+class LoadCellReversed(Fault):
+    """The load cell's signal wires are swapped: a push reads as a pull."""
+
+    kind: Literal["load_cell_reversed"]
+
+
 class LoadCellStuck(Fault):
     """Every word of the HX711 reads the same."""
 
@@ -193,6 +199,7 @@ AnyFault = Annotated[
     | SwitchFault
     | EmergencyStop
     | LoadCellSilent
+    | LoadCellReversed
     | LoadCellStuck
     | LoadCellBadWords
     | LineFault

@@ -236,7 +236,8 @@ struct plant {
     if (now.faults.hx711_silent) return;
     const double shown = load - bow_at(load, par.load_cell_bow, par.load_cell_span) +
                          par.load_cell_creep_share * now.cell_creep + now.cell_zero.value;
-    const double counts = par.load_cell_zero_counts + shown * par.counts_per_newton +
+    const double sign = now.faults.load_cell_reversed ? -1.0 : 1.0;
+    const double counts = par.load_cell_zero_counts + sign * shown * par.counts_per_newton +
                           par.load_cell_noise_counts * now.random.normal();
     int32_t word = static_cast<int32_t>(std::lround(counts));
     word = std::min(std::max(word, -0x800000), 0x7FFFFF);

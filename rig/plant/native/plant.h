@@ -77,6 +77,7 @@ typedef struct {
   int32_t tube_off;         /* syringe and actuator both end in open air */
   int32_t tube_blocked;     /* no gas passes between syringe and actuator */
   int32_t home_switch, end_switch; /* PLANT_SWITCH_... */
+  int32_t load_cell_reversed; /* a push reads as a pull */
   int32_t hx711_silent;     /* no conversions any more */
   int32_t hx711_stuck;      /* every word reads hx711_word */
   uint32_t hx711_word;
