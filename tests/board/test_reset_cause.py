@@ -14,7 +14,7 @@ import pytest
 
 from rig.board import emulator_build
 from rig.board.emulated import EmulatedBoard
-from rig.board.virtual import virtual_board
+from rig.board.virtual import VirtualBench
 from rig.link.bus import SlcanBus
 from rig.link.client import BoardStatus, RigLink
 from rig.spec.workspace import Workspace
@@ -45,14 +45,10 @@ def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
 class Mega:
     """An emulated Mega with the host's link."""
 
-    def __init__(self, image: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr("rig.board.emulated.firmware_image", lambda: image)
-        board = virtual_board(
-            with_beam_specimen(Workspace(ROOT).setup("bellow-bending", "emulated")), 1
-        )
-        assert isinstance(board, EmulatedBoard)
-        self.board = board
-        self.link = RigLink(SlcanBus(board))
+    def __init__(self, image: Path) -> None:
+        setup = with_beam_specimen(Workspace(ROOT).setup("bellow-bending", "emulated"))
+        self.board = EmulatedBoard(VirtualBench(setup, 1).plant, image=image)
+        self.link = RigLink(SlcanBus(self.board))
         self.link.open()
 
     @property
@@ -68,15 +64,13 @@ class Mega:
         return self.status
 
 
-def test_memory_that_was_lost_is_a_power_on(image: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    mega = Mega(image, monkeypatch)
+def test_memory_that_was_lost_is_a_power_on(image: Path) -> None:
+    mega = Mega(image)
     assert (mega.status.reset_cause, mega.status.fault) == ("power_on", "none")
 
 
-def test_a_hang_is_remembered_and_reported_once(
-    image: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    mega = Mega(image, monkeypatch)
+def test_a_hang_is_remembered_and_reported_once(image: Path) -> None:
+    mega = Mega(image)
     mega.board.hang()
     status = mega.restarted()
     assert (status.reset_cause, status.fault) == ("watchdog", "watchdog_reset")
