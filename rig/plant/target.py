@@ -40,14 +40,9 @@ def board_surfaces(target: CharucoTarget) -> tuple[list[Surface], Array]:
     """A printed board about its middle, and its size (2,) in metres."""
     cells = _cells(target)
     half = 0.5 * target.square * np.array([target.columns, target.rows])
-    cell = 2 * half / cells.shape[::-1]
     margin = half + _BORDER * target.square
-    surfaces = [Surface(_rectangle(-margin, margin), MATTE_WHITE)]
-    for row, line in enumerate(cells):
-        edges = np.flatnonzero(np.diff(np.concatenate(([0], line, [0]))))
-        for start, stop in edges.reshape(-1, 2):
-            low, high = np.array([(start, row), (stop, row + 1)]) * cell - half
-            surfaces.append(Surface(_rectangle(low, high), MARK_BLACK))
+    cell = float(2 * half[0] / cells.shape[1])
+    surfaces = [Surface(_rectangle(-margin, margin), MATTE_WHITE), *_black(cells, cell, -half)]
     return surfaces, 2 * margin
 
 
@@ -82,7 +77,7 @@ def views(
     shade = Light(optics.light_gradient, float(light.uniform(0, 2 * np.pi)))
     for number in range(count):
         placed, seen = _held(surfaces, size, lens, number, hand)
-        light_ = _flat_light(placed, seen) * shade.field(lens.width, lens.height)
+        light_ = flat_light(placed, seen) * shade.field(lens.width, lens.height)
         yield sensor.added(developed(light_, optics.blur), float(number))
 
 
@@ -108,7 +103,7 @@ def _held(
     return outlines, Box(0, 0, lens.width, lens.height)
 
 
-def _flat_light(outlines: Iterable[tuple[Array, Surface]], whole: Box) -> Picture:
+def flat_light(outlines: Iterable[tuple[Array, Surface]], whole: Box) -> Picture:
     """Linear light (3, height, width) of surfaces before a plain background.
 
     Coverages of equal colours are summed before they are mixed: neighbours leave no seam.
@@ -126,6 +121,24 @@ def _flat_light(outlines: Iterable[tuple[Array, Surface]], whole: Box) -> Pictur
     return light
 
 
+def marker_surfaces(name: int, side: float, centre: Array) -> list[Surface]:
+    """Marker `name` of OpenCV's dictionary 4X4_50, its black square `side` metres, on white."""
+    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+    cells = np.asarray(dictionary.generateImageMarker(name, 6) < 128, dtype=np.float64)
+    half = np.full(2, 0.5 * side)
+    paper = _rectangle(centre - 1.5 * half, centre + 1.5 * half)
+    return [Surface(paper, MATTE_WHITE), *_black(cells, side / 6, centre - half)]
+
+
+def _black(cells: Array, cell: float, corner: Array) -> Iterator[Surface]:
+    """The black cells of a pattern, row by row, neighbours in one piece."""
+    for row, line in enumerate(cells):
+        edges = np.flatnonzero(np.diff(np.concatenate(([0], line, [0]))))
+        for start, stop in edges.reshape(-1, 2):
+            low, high = np.array([(start, row), (stop, row + 1)]) * cell + corner
+            yield Surface(_rectangle(low, high), MARK_BLACK)
+
+
 def _cells(target: CharucoTarget) -> Array:
     """The board (rows, columns) in cells as fine as the bits of its markers: 1 is black."""
     across = round(6 * target.square / target.marker)
@@ -133,7 +146,7 @@ def _cells(target: CharucoTarget) -> Array:
     shape = (target.columns, target.rows)
     board = cv2.aruco.CharucoBoard(shape, float(across), 6.0, dictionary)
     image = board.generateImage((target.columns * across, target.rows * across), marginSize=0)
-    return np.asarray(image < 128, dtype=np.int8)
+    return np.asarray(image < 128, dtype=np.float64)
 
 
 def _rectangle(low: Array, high: Array) -> Array:

@@ -85,6 +85,16 @@ class PicturePlane:
             return np.eye(3)[None]
         return self.rectification.homography[None]
 
+    def places_mm(self, pixels: FloatArray) -> FloatArray:
+        """Places (n, 2) in mm in the plane of the ruler of distorted pixels (n, 2).
+
+        x and y along the ruler's legs, from the mean of its marks; needs a ruler.
+        """
+        assert self.rectification is not None
+        places = _to_plane(self._homographies(), self.undistort(pixels))[0]
+        inside: FloatArray = self.rectification.pitch_mm * places
+        return inside
+
     def scale_mm_per_px(self, pixel: FloatArray) -> float | None:
         """Size of a pixel at `pixel` (2,), mm; None without a ruler."""
         if self.rectification is None:

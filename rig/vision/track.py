@@ -1,8 +1,7 @@
 """A bending angle followed through a film: search where the cap is expected, refuse what jumps.
 
-A Kalman filter (Kalman 1960) with constant velocity and white acceleration holds the angle and the
-place of the cap. It only predicts and gates: a measured angle is never replaced by a filtered one,
-and a frame without a trusted angle has none.
+A Kalman filter holds the angle and the place of the cap. It only predicts and gates: a measured
+angle is never replaced by a filtered one, and a frame without a trusted angle has none.
 """
 
 from __future__ import annotations
@@ -10,12 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from filterpy.common import Q_discrete_white_noise
-from filterpy.kalman import KalmanFilter
 
 from rig.vision.errors import VisionError
 from rig.vision.lines import FloatArray
 from rig.vision.measure import AngleMeasurement, AngleMeter
+from rig.vision.motion import ConstantVelocity
 from rig.vision.plane import PicturePlane
 from rig.vision.segment import Image
 
@@ -129,10 +127,9 @@ def _place(result: AngleMeasurement) -> FloatArray:
 
 @dataclass(frozen=True)
 class _Track:
-    """Angle, its rate, the cap's x, its rate, the cap's y and its rate, as of `time_s`."""
+    """What is expected at `time_s`: the angle, and the cap's x and y."""
 
-    mean: FloatArray
-    covariance: FloatArray
+    state: ConstantVelocity
     time_s: float
     seen_s: float  # when the last accepted frame was taken
     last: AngleMeasurement  # the last accepted one
@@ -141,50 +138,34 @@ class _Track:
     @classmethod
     def begun(cls, result: AngleMeasurement, time_s: float) -> _Track:
         """A track of one accepted frame."""
-        assert result.angle_deg is not None
-        x, y = _place(result)
-        sd = [result.u_deg, START_RATE_DEG_S, *2 * (PLACE_U_PX, START_RATE_PX_S)]
-        mean = np.array([result.angle_deg, 0.0, x, 0.0, y, 0.0])
-        return cls(mean, np.diag(np.square(sd)), time_s, time_s, result, time_s)
+        rates = np.array([START_RATE_DEG_S, START_RATE_PX_S, START_RATE_PX_S])
+        state = ConstantVelocity.begun(_values(result), _u(result), rates)
+        return cls(state, time_s, time_s, result, time_s)
 
     @property
     def angle_deg(self) -> float:
-        return float(self.mean[0])
+        return float(self.state.values[0])
 
     @property
     def rate_deg_s(self) -> float:
-        return float(self.mean[1])
+        return float(self.state.rates[0])
 
     @property
     def u_angle_deg(self) -> float:
-        return float(np.sqrt(self.covariance[0, 0]))
+        return float(self.state.u[0])
 
     def predicted(self, time_s: float, motion: Motion) -> _Track:
         """The track at a later time."""
-        step = time_s - self.time_s
-        filter_ = self._filter()
-        filter_.F = np.kron(np.eye(3), [[1.0, step], [0.0, 1.0]])
-        unit = Q_discrete_white_noise(2, dt=step, var=1.0)
-        places = 2 * (motion.place_px_s2**2,)
-        filter_.Q = np.kron(np.diag([motion.angle_deg_s2**2, *places]), unit)
-        filter_.predict()
-        return replace(
-            self, mean=filter_.x.ravel(), covariance=np.asarray(filter_.P), time_s=time_s
-        )
+        acceleration = np.array([motion.angle_deg_s2, motion.place_px_s2, motion.place_px_s2])
+        state = self.state.predicted(time_s - self.time_s, acceleration)
+        return replace(self, state=state, time_s=time_s)
 
     def updated(self, result: AngleMeasurement) -> _Track:
         """The track with an accepted frame of its time."""
-        filter_ = self._filter()
-        filter_.update(np.array([[result.angle_deg], *_place(result)[:, None]]), R=_noise(result))
+        state = self.state.updated(_values(result), _u(result))
         same = _plane(result) is _plane(self.last)
-        return _Track(
-            filter_.x.ravel(),
-            np.asarray(filter_.P),
-            self.time_s,
-            self.time_s,
-            result,
-            self.relooked_s if same else self.time_s,
-        )
+        relooked_s = self.relooked_s if same else self.time_s
+        return _Track(state, self.time_s, self.time_s, result, relooked_s)
 
     def gated(self, result: AngleMeasurement) -> AngleMeasurement:
         """The same measurement, rejected if the angle is not where it can have come to."""
@@ -203,18 +184,16 @@ class _Track:
 
     def reach(self) -> tuple[FloatArray, float]:
         """How far the cap should have moved since the last accepted frame, give or take, px."""
-        place, spread = self.mean[[2, 4]], self.covariance[[2, 4], [2, 4]]
-        margin = CAP_REACH_PX + GATE_SIGMAS * float(np.sqrt(spread.max()))
-        return place - _place(self.last), margin
-
-    def _filter(self) -> KalmanFilter:
-        filter_ = KalmanFilter(dim_x=6, dim_z=3)
-        filter_.x = self.mean[:, None].copy()
-        filter_.P = self.covariance.copy()
-        filter_.H = np.kron(np.eye(3), [[1.0, 0.0]])
-        return filter_
+        margin = CAP_REACH_PX + GATE_SIGMAS * float(self.state.u[1:].max())
+        return self.state.values[1:] - _place(self.last), margin
 
 
-def _noise(result: AngleMeasurement) -> FloatArray:
-    """Covariance (3, 3) of a measured angle and place."""
-    return np.diag([result.u_deg**2, PLACE_U_PX**2, PLACE_U_PX**2])
+def _values(result: AngleMeasurement) -> FloatArray:
+    """Angle and place (3,) of an accepted measurement."""
+    assert result.angle_deg is not None
+    return np.array([result.angle_deg, *_place(result)])
+
+
+def _u(result: AngleMeasurement) -> FloatArray:
+    """Their standard uncertainties (3,)."""
+    return np.array([result.u_deg, PLACE_U_PX, PLACE_U_PX])
