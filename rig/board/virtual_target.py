@@ -23,15 +23,15 @@ def board_views(bench: BenchSpec, target: CharucoTarget, seed: int, count: int) 
 def ruler_views(
     bench: BenchSpec, ruler: RulerCalibration, seed: int, count: int
 ) -> Iterator[Image]:
-    """Pictures of the ruler, whose legs are as square as its calibration says."""
+    """Pictures of the ruler that the bench's runs have."""
     optics = virtual_part(bench).optics
-    return views(*ruler_surfaces(ruler, hidden_lean(ruler, seed)), optics, _camera(seed), count)
+    return views(*ruler_surfaces(ruler, hidden_lean(bench, seed)), optics, _camera(seed), count)
 
 
-def hidden_lean(ruler: RulerCalibration, seed: int) -> float:
-    """By how many rad the legs of the ruler are closer than a right angle."""
-    rng = np.random.default_rng(Seeds.of(seed, 0).camera.spawn(6)[5])
-    return float(np.radians(rng.normal(0.0, ruler.squareness_u_deg)))
+def hidden_lean(bench: BenchSpec, seed: int) -> float:
+    """By how many rad the legs of the bench's ruler are closer than a right angle."""
+    square = _camera(seed).spawn(6)[5]
+    return float(square.normal(0.0, virtual_part(bench).optics.ruler_squareness))
 
 
 def _camera(seed: int) -> np.random.Generator:

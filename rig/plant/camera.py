@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from enum import Enum
 
 import cv2
@@ -69,9 +70,10 @@ class SensorNoise:
 class VirtualCamera:
     """A USB camera in front of the virtual bench.
 
-    `rng` draws the lens, how crooked the camera stands, the direction of the light, the background
-    and the noise; the same generator state gives the same camera, and the same angle and time the
-    same picture, however many were taken before. `profile` gives the actuator's outlines.
+    `rng` draws the lens, how square the ruler is, how crooked the camera stands, the direction of
+    the light, the background and the noise; the same generator state gives the same camera, and
+    the same angle and time the same picture, however many were taken before. `profile` gives the
+    actuator's outlines.
     `fault` may be set at any time. Raises SceneError if actuator and ruler do not fit into the
     picture.
     """
@@ -85,10 +87,12 @@ class VirtualCamera:
         rng: np.random.Generator,
         profile: ProfileFunction = side_profile,
     ) -> None:
-        pose, light, cloth, noise, glass = rng.spawn(5)
+        pose, light, cloth, noise, glass, square = rng.spawn(6)
         lens = draw_lens(optics.lens, glass)
         self.projection = draw_projection(lens, optics, pose)
-        self.layout = lay_out(geometry, ruler, self.projection, profile)
+        lean = float(square.normal(0.0, optics.ruler_squareness))
+        layout = lay_out(geometry, ruler, self.projection, profile)
+        self.layout = replace(layout, ruler_lean=lean)
         self.fault = CameraFault.NONE
         self._geometry = geometry
         self._profile = profile

@@ -39,6 +39,8 @@ class Layout:
     """y of the lower edge of the frame, where the connector hangs."""
     ruler_corner: tuple[float, float]
     """Centre of the ruler's corner mark; one leg points up, the other to the right."""
+    ruler_lean: float = 0.0
+    """By how many rad the angle between the legs is less than a right one."""
 
     def place(self, outline: Array) -> Array:
         """Bench coordinates (n, 2) of a profile outline (n, 2) of x along the axis and z."""
@@ -62,10 +64,14 @@ def ruler_outline(corner: tuple[float, float], ruler: RulerCalibration) -> Array
     )
 
 
-def mark_centres(corner: tuple[float, float], ruler: RulerCalibration) -> Array:
-    """Centres (2 marks + 1, 2) in bench metres: the corner, then upwards, then to the right."""
+def mark_centres(corner: tuple[float, float], ruler: RulerCalibration, lean: float = 0.0) -> Array:
+    """Centres (2 marks + 1, 2) in bench metres: the corner, then upwards, then to the right.
+
+    The upright leg leans by `lean` rad towards the other one.
+    """
     steps = np.arange(1, ruler.marks + 1) * ruler.pitch
     offsets = np.zeros((2 * ruler.marks + 1, 2))
+    offsets[1 : ruler.marks + 1, 0] = np.tan(lean) * steps
     offsets[1 : ruler.marks + 1, 1] = -steps
     offsets[ruler.marks + 1 :, 0] = steps
     return offsets + corner

@@ -244,7 +244,7 @@ class Scene:
         light = _over(light, MATTE_WHITE[:, None, None], outline)
         turn = np.linspace(0, 2 * np.pi, 180, endpoint=False)
         disc = 0.5 * MARK_DIAMETER * np.column_stack((np.cos(turn), np.sin(turn)))
-        for centre in mark_centres(corner, ruler):
+        for centre in mark_centres(corner, ruler, self._layout.ruler_lean):
             mark = self._cover(centre + disc, self._whole)
             light = _over(light, MARK_BLACK[:, None, None], mark)
         return light

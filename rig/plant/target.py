@@ -52,9 +52,7 @@ def ruler_surfaces(ruler: RulerCalibration, lean: float) -> tuple[list[Surface],
     corner = (-0.5 * leg, 0.5 * leg)
     turn = np.linspace(0, 2 * np.pi, 60, endpoint=False)
     disc = 0.5 * MARK_DIAMETER * np.column_stack((np.cos(turn), np.sin(turn)))
-    centres = mark_centres(corner, ruler)
-    upright = slice(1, ruler.marks + 1)
-    centres[upright, 0] -= np.tan(lean) * (centres[upright, 1] - corner[1])
+    centres = mark_centres(corner, ruler, lean)
     surfaces = [Surface(ruler_outline(corner, ruler), MATTE_WHITE)]
     surfaces += [Surface(centre + disc, MARK_BLACK) for centre in centres]
     return surfaces, np.full(2, leg + 2 * RULER_WIDTH)

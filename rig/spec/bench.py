@@ -279,6 +279,9 @@ class VirtualOptics(SpecModel):
 
     lens: VirtualLens
     distance: Length = Field(gt=0, description="camera to the plane of bending")
+    ruler_squareness: Angle = Field(
+        ge=0, le=math.radians(2), description="standard deviation of the ruler's right angle"
+    )
     tilt: Angle = Field(
         ge=0, le=math.radians(20), description="standard deviation of pan, tilt and roll"
     )

@@ -51,8 +51,7 @@ def test_a_ruler_is_found_as_square_as_it_is(rig, tmp_path):  # noqa: F811
     assert outcome.code == 0, outcome.err
     made = read(file, RulerCalibration).spec
     lean_deg, _ = made.evidence.fits[0].values
-    known = Workspace.find().resolve_bench(Workspace.find().bench("virtual")).ruler
-    hidden = np.degrees(hidden_lean(known, SEED))
+    hidden = np.degrees(hidden_lean(Workspace.find().bench("virtual"), SEED))
     assert lean_deg == pytest.approx(hidden, abs=2.0 * made.squareness_u_deg)
     assert made.pitch == pytest.approx(10.002e-3)
     assert made.pitch_u == pytest.approx(0.004e-3)

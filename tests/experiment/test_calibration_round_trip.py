@@ -12,6 +12,7 @@ import pytest
 
 from rig.board.virtual import VirtualBench
 from rig.board.virtual_calibration import CELSIUS, VirtualCalibrationBench
+from rig.board.virtual_target import hidden_lean
 from rig.calibrate.load_cell import fit_load_cell
 from rig.calibrate.points import Row
 from rig.calibrate.syringe import Surroundings, fit_syringe
@@ -177,6 +178,13 @@ def test_the_instruments_are_those_of_a_run_with_the_same_seed() -> None:
     shared |= {"load_cell_creep_share", "volume_per_step", "dead_volume", "backlash_volume"}
     for name in shared:
         assert run.plant.parameters[name] == alone.plant.parameters[name]
+    assert run.camera._camera.layout.ruler_lean == hidden_lean(BENCH, 5) != 0
+
+
+def test_rulers_are_as_square_as_the_bench_says() -> None:
+    assert BENCH.virtual is not None
+    leans = [hidden_lean(BENCH, seed) for seed in range(300)]
+    assert np.std(leans) == pytest.approx(BENCH.virtual.optics.ruler_squareness, rel=0.15)
 
 
 def test_the_reference_gauge_has_an_error_of_its_own() -> None:

@@ -139,7 +139,8 @@ def test_the_end_cap_is_turned_by_the_bending_angle(quiet, angle_deg):
 
 def test_the_marks_are_where_the_ruler_has_them(quiet):
     picture = light(quiet.render(0.0, 0.0)[..., 1])
-    centres = quiet.projection.project(mark_centres(quiet.layout.ruler_corner, RULER))
+    layout = quiet.layout
+    centres = quiet.projection.project(mark_centres(layout.ruler_corner, RULER, layout.ruler_lean))
     assert len(centres) == 2 * RULER.marks + 1
     for x, y in centres:
         column, row = round(x), round(y)
@@ -150,6 +151,15 @@ def test_the_marks_are_where_the_ruler_has_them(quiet):
         seen_x = column + (dark.sum(axis=0) @ offsets) / dark.sum()
         seen_y = row + (dark.sum(axis=1) @ offsets) / dark.sum()
         assert np.hypot(seen_x - x, seen_y - y) < EDGE_TOLERANCE
+
+
+def test_a_crooked_ruler_has_its_upright_marks_towards_the_other_leg():
+    crooked = camera(3, ruler_squareness=np.radians(1.0)).layout
+    assert crooked.ruler_lean == pytest.approx(50 * camera(3).layout.ruler_lean)
+    marks = mark_centres(crooked.ruler_corner, RULER, crooked.ruler_lean)
+    up, right = marks[RULER.marks] - marks[0], marks[-1] - marks[0]
+    between = np.arccos(up @ right / np.linalg.norm(up) / np.linalg.norm(right))
+    assert between == pytest.approx(np.pi / 2 - crooked.ruler_lean, abs=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(6))
