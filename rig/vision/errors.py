@@ -15,7 +15,7 @@ class VisionError(RigError):
 
 
 class UntrustedFrameError(Exception):
-    """Why a frame gives no angle; never leaves the package, it becomes a rejected measurement."""
+    """Why a frame gives nothing to trust; meters turn it into a rejected measurement."""
 
 
 class UnsharpFrameError(UntrustedFrameError):
