@@ -1,6 +1,7 @@
-"""How long the finite elements take: kernels, the default bellow to 10 kPa, its refinement, growth.
+"""How long the finite elements take: kernels, the default bellow to 10 kPa, refinement, growth.
 
-Run `python -m tests.bench.bench_fe`, or name some of the tables: kernels, run, refinement, growth.
+Run `python -m tests.bench.bench_fe`, or name some of the tables: kernels, run, refinement,
+blocked, growth.
 Targets: 20 s for the default run on two cores, meshing included; discretisation error of the
 angle at 10 kPa below 0.5 %; time growing no worse than N^1.3 with the number of convolutions.
 """
@@ -20,7 +21,10 @@ from rig.mechanics.fe import Point, Result, follow
 from rig.mechanics.fe.linear import SuperLU, default_solver
 from rig.mechanics.mesh.bellow_bending import BendingResolution
 from rig.mechanics.simulate.bending import FREE_OPTIONS, BendingModel, bending_model
+from rig.mechanics.simulate.blocked import BLOCKED_OPTIONS, blocked_bending_model
 from rig.spec.actuator import BellowBendingGeometry
+from rig.spec.material import MaterialSpec
+from rig.spec.quantity import STANDARD_GRAVITY
 from rig.spec.workspace import Workspace
 
 TARGET_S = 20.0
@@ -31,8 +35,9 @@ PITCH_MM = 11
 DEFAULT = BendingResolution(wall=1)
 """What predictions take."""
 REFINED = {
-    "as it is": DEFAULT,
-    "wall": replace(DEFAULT, wall=DEFAULT.wall + 1),
+    "coarse, as specimens": replace(DEFAULT, crown=4),
+    "as predictions": DEFAULT,
+    "two through walls": replace(DEFAULT, wall=2),
     "round and across": replace(DEFAULT, crown=9, plate=5),
     "along the arcs": replace(
         DEFAULT,
@@ -45,12 +50,19 @@ REFINED = {
     ),
     "side, floor, ends": replace(DEFAULT, side=2, heel=2, floor=2, end_wall=2),
 }
-"""The default mesh, and that refined in one direction at a time."""
+"""The mesh of predictions, and that refined in one direction at a time."""
+FORCED = ("coarse, as specimens", "as predictions", "two through walls")
 
 
 def main(wanted: Sequence[str] = ()) -> None:
     """Print the tables."""
-    tables = {"kernels": kernels, "run": run, "refinement": refinement, "growth": growth}
+    tables = {
+        "kernels": kernels,
+        "run": run,
+        "refinement": refinement,
+        "blocked": blocked,
+        "growth": growth,
+    }
     for name in wanted or tables:
         print(f"\n{name}")
         for row in tables[name]():
@@ -112,6 +124,26 @@ def refinement() -> Iterator[str]:
         )
 
 
+def blocked() -> Iterator[str]:
+    """The blocked force on meshes of three finenesses."""
+    head = "".join(f"{p / 1e3:>9.0f}" for p in TOLD)
+    yield f"{'force in g at kPa':<20}{head}{'elements':>10}{'s':>7}{'solves':>8}{'assembly':>10}"
+    for name in FORCED:
+        held = blocked_bending_model(*_setup(), resolution=REFINED[name])
+        result = follow(held.model, [Point(p) for p in PRESSURES], options=BLOCKED_OPTIONS)
+        weight = held.measures(result.solutions[0])["force"]
+        found = {
+            round(s.pressure): 1e3 * (held.measures(s)["force"] - weight) / STANDARD_GRAVITY
+            for s in result.solutions
+        }
+        forces = "".join(f"{found.get(round(p), np.nan):9.3f}" for p in TOLD)
+        share = result.assembly_seconds / (result.assembly_seconds + result.solve_seconds)
+        yield (
+            f"{name:<20}{forces}{len(held.bending.soft.elements):>10}{result.seconds:>7.0f}"
+            f"{result.solves:>8}{share:>10.0%}"
+        )
+
+
 def growth() -> Iterator[str]:
     """Seconds against the number of equal convolutions, to an angle that grows with them."""
     numbers, seconds = [], []
@@ -147,10 +179,15 @@ def timed(work: Callable[[], object], repeats: int = 5) -> str:
 def _actuator(
     resolution: BendingResolution = DEFAULT, geometry: BellowBendingGeometry | None = None
 ) -> BendingModel:
+    known, material = _setup()
+    return bending_model(geometry or known, material, resolution=resolution)
+
+
+def _setup() -> tuple[BellowBendingGeometry, MaterialSpec]:
     setup = Workspace.find().setup("bellow-bending")
     known = setup.actuator.geometry
     assert isinstance(known, BellowBendingGeometry)
-    return bending_model(geometry or known, setup.material, resolution=resolution)
+    return known, setup.material
 
 
 def _angles(actuator: BendingModel, result: Result) -> dict[float, float]:
