@@ -90,6 +90,14 @@ def _numeric(root: str, path: tuple[str, ...], info: FieldInfo, value: float) ->
     return NumericField(root, path, unit_of(info), isinstance(value, int))
 
 
+def value_of(spec: BaseModel, path: tuple[str, ...]) -> float:
+    """The SI value of a numeric field."""
+    at: Any = spec
+    for part in path:
+        at = at[int(part)] if isinstance(at, tuple) else getattr(at, part)
+    return float(at)
+
+
 def with_values(spec: S, values: dict[tuple[str, ...], float]) -> S:
     """A validated copy of `spec` with SI values at paths; raises StudyError where it cannot be."""
     data = spec.model_dump()

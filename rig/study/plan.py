@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from rig.mechanics.store import content_key
 from rig.spec.actuator import ActuatorSpec
 from rig.spec.loading import read
@@ -14,8 +16,8 @@ from rig.spec.study import StudyFactor, StudyResponse, StudySpec
 from rig.spec.workspace import Workspace
 from rig.study.design import coded_points
 from rig.study.errors import StudyError
-from rig.study.factors import Factor, actual
-from rig.study.fields import NumericField, numeric_field, with_values
+from rig.study.factors import Array, Factor, actual, coded
+from rig.study.fields import NumericField, numeric_field, value_of, with_values
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,14 @@ class Space:
     def in_lab_units(self, factor: str, value: float) -> float:
         """An SI value of a factor in its lab unit."""
         return self.fields[factor].to_lab(value)
+
+    @property
+    def own(self) -> Array | None:
+        """The actuator as it is, coded, (k,); None where that is beyond the levels."""
+        specs = {"actuator": self.actuator, "material": self.material}
+        values = [value_of(specs[f.root], f.path) for f in self.fields.values()]
+        found = coded(self.factors, np.array([values]))[0]
+        return found if np.all(np.abs(found) <= 1 + 1e-9) else None
 
     def point(self, name: str, row: Sequence[float]) -> Point:
         """The point with SI values `row` of the factors; without a task where that is no spec."""

@@ -7,6 +7,7 @@ relative to its size.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -189,6 +190,9 @@ def _cobyla(how: CobylaSearch, memory: Memory) -> None:
     bounds = [{"type": "ineq", "fun": lambda x: np.concatenate([x, 1 - x])}]
     rng = np.random.default_rng(how.seed)
     starts = qmc.Sobol(k, rng=rng).random(2 ** int(np.ceil(np.log2(max(how.starts, 2)))))
+    own = memory.space.own
+    if own is not None:
+        starts[0] = (own + 1) / 2
     for start in starts[: how.starts]:
         first = float(at(start).objectives[0])
         scale = max(abs(first), 1e-9) if np.isfinite(first) else scale
@@ -250,8 +254,11 @@ def _bayesian(how: BayesianSearch, memory: Memory) -> None:
         n_startup_trials=max(5, how.evaluations // 4),
         multivariate=True,
     )
-    import warnings
-
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
-        optuna.create_study(sampler=sampler).optimize(objective, n_trials=how.evaluations)
+        study = optuna.create_study(sampler=sampler)
+        own = memory.space.own
+        if own is not None:
+            unit = np.clip((own + 1) / 2, 0, 1).tolist()
+            study.enqueue_trial(dict(zip(names, unit, strict=True)))
+        study.optimize(objective, n_trials=how.evaluations)

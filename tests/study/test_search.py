@@ -105,6 +105,12 @@ def test_points_without_an_answer_break_a_limit_and_cost_nothing_else() -> None:
     assert 6.3 <= 1e3 * best.point.values["radius"] < 6.4
 
 
+@pytest.mark.parametrize("how", ["cobyla", "bayesian"])
+def test_the_actuator_as_it_is_is_tried_first(how: str) -> None:
+    first = run([BOWL], how).memory.evaluations[0].point.values
+    assert first == pytest.approx({"wall": 1.5e-3, "radius": 6e-3})
+
+
 def test_a_search_that_is_repeated_computes_nothing(tmp_path: Path) -> None:
     first = run([BOWL], "nsga2", tmp_path)
     again = run([BOWL], "nsga2", tmp_path)
