@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Literal
 
-from rig.board.camera import OpenCvCamera
+from rig.board.camera import open_camera
 from rig.board.errors import BoardError
 from rig.link.open import open_bus
-from rig.spec.bench import BenchSpec, OpenCvCameraDevice, SerialBoard
+from rig.spec.bench import BenchSpec, SerialBoard
 from rig.spec.calibration import CameraCalibration
 
 INSTRUCTIONS = {
@@ -34,20 +34,9 @@ class RealBench:
     ) -> None:
         if not isinstance(bench.board, SerialBoard):
             raise BoardError(f"the bench '{bench.name}' has no serial board")
-        if not isinstance(bench.camera.device, OpenCvCameraDevice):
-            raise BoardError(
-                f"the bench '{bench.name}' has a real board but a virtual camera; set "
-                "camera.device to kind 'opencv' with the number of the device."
-            )
         self.bus = open_bus(bench.board.port, bench.board.baudrate, start_s=start_s)
         try:
-            self.camera = OpenCvCamera(
-                bench.camera.device.source,
-                camera.width,
-                camera.height,
-                bench.camera.jpeg_quality,
-                lambda: self.bus.now_s,
-            )
+            self.camera = open_camera(bench.camera, camera, lambda: self.bus.now_s)
         except BoardError:
             self.bus.close()
             raise

@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from rich.console import Console
 
-from rig.board.camera import OpenCvCamera
-from rig.spec.bench import BenchSpec, OpenCvCameraDevice
+from rig.board.camera import open_camera
+from rig.spec.bench import BenchSpec
 from rig.spec.calibration import CameraCalibration, Environment, Provenance
 from rig.spec.calibration_file import free_path, write_calibration
 from rig.spec.loading import AnyCalibration
@@ -32,8 +32,7 @@ def frames_of_camera(bench: BenchSpec, mode: CameraCalibration) -> Iterator[Imag
 
     Ends with Ctrl-C, or when nobody asks any more. Raises BoardError.
     """
-    assert isinstance(bench.camera.device, OpenCvCameraDevice)
-    camera = OpenCvCamera(bench.camera.device.source, mode.width, mode.height, 100, lambda: 0.0)
+    camera = open_camera(bench.camera, mode, lambda: 0.0)
     try:
         while True:
             jpeg = camera.grab()[1]

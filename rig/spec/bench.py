@@ -138,16 +138,31 @@ class VirtualCameraDevice(SpecModel):
 
 
 class OpenCvCameraDevice(SpecModel):
-    """A camera, video file or stream that OpenCV opens."""
+    """A camera, video file, stream or sequence of images that OpenCV opens."""
 
     kind: Literal["opencv"]
-    source: Integer | str
+    source: Integer | str = Field(
+        description="device number, file, URL, or images numbered as in frames/%04d.png"
+    )
+
+
+class RealSenseCameraDevice(SpecModel):
+    """The colour camera of an Intel RealSense; needs the extra `realsense`."""
+
+    kind: Literal["realsense"]
+    serial_number: str = Field("", description="of the one to use; empty: the only one")
 
 
 class Camera(SpecModel):
     """The camera beside the actuator, and the ruler in its picture."""
 
-    device: Annotated[VirtualCameraDevice | OpenCvCameraDevice, Field(discriminator="kind")]
+    device: Annotated[
+        VirtualCameraDevice | OpenCvCameraDevice | RealSenseCameraDevice,
+        Field(discriminator="kind"),
+    ]
+    latency: Duration = Field(
+        0.0, ge=0, le=2, description="from exposure to arrival, taken off a frame's time"
+    )
     jpeg_quality: Integer = Field(92, ge=50, le=100)
     frame_rate: Frequency = Field(ge=0.1, le=1000)
     calibration: str = Field(description="file in calibration/, or a path")
