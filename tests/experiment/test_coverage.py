@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from .coverage import force_coverage, pressure_coverage
+from .coverage import angle_coverage, force_coverage, pressure_coverage
 
 FEW = range(30)
 MANY = range(1000)
@@ -33,3 +33,10 @@ def test_of_a_thousand_forces_93_to_97_percent_are_within_their_interval() -> No
     found = force_coverage(MANY)
     print(f"\nforce: {found}")
     assert LOWEST <= found.share <= HIGHEST, found
+
+
+@pytest.mark.slow
+def test_the_interval_of_an_angle_holds_the_truth_as_often_as_it_says() -> None:
+    found = angle_coverage(range(150))
+    print(f"\nangle: {found}")
+    assert found.plausible, found
