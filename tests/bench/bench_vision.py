@@ -73,8 +73,8 @@ def table() -> list[tuple[str, str, str, str]]:
 
 def film() -> Callable[[], object]:
     """What measures the next frame of a film that runs to and fro."""
-    angles = [*range(40, 60, 2), *range(60, 40, -2)]
-    images = [render(Scene(angle=angle, seed=angle)) for angle in angles]
+    angles = 50.0 + 10.0 * np.sin(np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False))
+    images = [render(Scene(angle=angle, seed=seed)) for seed, angle in enumerate(angles.tolist())]
     tracker = AngleTracker(AngleMeter(CAMERA, RULER))
     frames = enumerate(cycle(images))
 

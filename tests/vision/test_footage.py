@@ -10,7 +10,7 @@ import pytest
 
 from rig.vision.measure import AngleMeter
 
-LABEL_TOLERANCE_DEG = 5.0
+LABEL_TOLERANCE_DEG = 4.0
 
 
 @pytest.fixture
