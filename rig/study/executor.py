@@ -18,7 +18,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any, Protocol
 
 from rig.errors import RigError
-from rig.study.errors import StudyError
+from rig.study.extras import package
 
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
@@ -199,7 +199,7 @@ class DaskCluster:
     def map(self, function: Callable[[Any], Any], tasks: Sequence[Any]) -> Iterator[Outcome]:
         """Outcomes as they come; tasks of workers that died are given to others by the scheduler,
         three times at most."""
-        distributed = _cluster_package("dask.distributed")
+        distributed = package("dask.distributed", "cluster")
         with self.start() as cluster, distributed.Client(cluster) as client:
             futures = {
                 client.submit(timed, function, task, pure=False): index
@@ -219,7 +219,7 @@ def local_dask(workers: int, threads: int = 1) -> DaskCluster:
     """Dask's own processes on this machine; raises StudyError without the extra `cluster`."""
 
     def start() -> Any:
-        distributed = _cluster_package("dask.distributed")
+        distributed = package("dask.distributed", "cluster")
         with _thread_variables(threads):
             return distributed.LocalCluster(
                 n_workers=workers,
@@ -239,7 +239,7 @@ def slurm(workers: int, threads: int = 1, **options: Any) -> DaskCluster:
     """
 
     def start() -> Any:
-        jobqueue = _cluster_package("dask_jobqueue")
+        jobqueue = package("dask_jobqueue", "cluster")
         exports = [f"export {name}={threads}" for name in THREAD_VARIABLES]
         settings = {"cores": 1, "processes": 1, "memory": "2GB", **options}
         prologue = [*exports, *settings.pop("job_script_prologue", [])]
@@ -254,15 +254,3 @@ def slurm(workers: int, threads: int = 1, **options: Any) -> DaskCluster:
         return cluster
 
     return DaskCluster(start, workers)
-
-
-def _cluster_package(name: str) -> Any:
-    import importlib
-
-    try:
-        return importlib.import_module(name)
-    except ImportError:
-        raise StudyError(
-            f"{name} is not installed; install rig with its extra 'cluster', or take the executor "
-            f"'local'."
-        ) from None

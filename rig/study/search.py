@@ -23,6 +23,7 @@ from rig.spec.optimisation import (
 )
 from rig.study.evaluate import evaluate
 from rig.study.executor import timed
+from rig.study.extras import package
 from rig.study.factors import Array, actual
 from rig.study.plan import Point, Space, Task
 from rig.study.results import Answer, Folder
@@ -212,16 +213,15 @@ def _cobyla(how: CobylaSearch, memory: Memory) -> None:
 
 
 def _nsga(how: NsgaSearch, memory: Memory) -> None:
-    from pymoo.algorithms.moo.nsga2 import NSGA2
-    from pymoo.core.problem import ElementwiseProblem
-    from pymoo.optimize import minimize
-
+    problems = package("pymoo.core.problem", "search")
+    algorithm = package("pymoo.algorithms.moo.nsga2", "search").NSGA2(pop_size=how.population)
+    minimize = package("pymoo.optimize", "search").minimize
     objectives = sum(one.is_objective for one in memory.responses)
     limits = 1 + sum(
         limit is not None for one in memory.responses for limit in (one.at_most, one.at_least)
     )
 
-    class _Problem(ElementwiseProblem):  # type: ignore[misc]
+    class _Problem(problems.ElementwiseProblem):  # type: ignore[misc, name-defined]
         def __init__(self) -> None:
             k = len(memory.space.factors)
             super().__init__(n_var=k, n_obj=objectives, n_ieq_constr=limits, xl=0.0, xu=1.0)
@@ -231,12 +231,11 @@ def _nsga(how: NsgaSearch, memory: Memory) -> None:
             out["F"] = np.where(np.isfinite(found.objectives), found.objectives, 1e30)
             out["G"] = found.violation
 
-    minimize(_Problem(), NSGA2(pop_size=how.population), ("n_gen", how.generations), seed=how.seed)
+    minimize(_Problem(), algorithm, ("n_gen", how.generations), seed=how.seed)
 
 
 def _bayesian(how: BayesianSearch, memory: Memory) -> None:
-    import optuna
-
+    optuna = package("optuna", "search")
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     names = [one.name for one in memory.space.factors]
 

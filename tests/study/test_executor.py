@@ -11,7 +11,9 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 import doubles
 
+from rig.study.errors import StudyError
 from rig.study.executor import Executor, InProcess, LocalProcesses, local_dask
+from rig.study.extras import package
 
 
 @pytest.fixture(autouse=True)
@@ -56,6 +58,11 @@ def test_dask_gives_the_same(tmp_path: Path) -> None:
     tasks = [(number, str(tmp_path)) for number in range(4)]
     outcomes = sorted(local_dask(2).map(doubles.dying_at_once, tasks), key=lambda o: o.index)
     assert [o.value for o in outcomes] == [0, 1, 2, 3]
+
+
+def test_a_missing_extra_is_named() -> None:
+    with pytest.raises(StudyError, match=r"rig\[cluster\]"):
+        package("no_such_package", "cluster")
 
 
 @pytest.mark.slow
