@@ -125,7 +125,7 @@ struct rig_emulator {
 
   ~rig_emulator() {
     if (avr == nullptr) return;
-    if (trace) avr_vcd_close(trace.get());
+    end_trace();
     avr_terminate(avr);
     std::free(avr);
   }
@@ -432,6 +432,11 @@ struct rig_emulator {
     return avr_vcd_start(trace.get()) == 0;
   }
 
+  void end_trace() {
+    if (trace) avr_vcd_close(trace.get());
+    trace.reset();
+  }
+
   avr_eeprom_desc_t eeprom() const {
     avr_eeprom_desc_t desc = {};
     avr_ioctl(avr, AVR_IOCTL_EEPROM_GET, &desc);
@@ -549,6 +554,8 @@ void rig_emulator_hold_hx711(rig_emulator *emulator, int hold) {
 int rig_emulator_trace(rig_emulator *emulator, const char *file) {
   return emulator->start_trace(file);
 }
+
+void rig_emulator_end_trace(rig_emulator *emulator) { emulator->end_trace(); }
 
 void rig_emulator_stepper(const rig_emulator *emulator, rig_stepper_figures *figures) {
   *figures = emulator->stepper.figures();

@@ -67,6 +67,7 @@ void rig_emulator_hold_hx711(rig_emulator *emulator, int hold);
 
 /* Writes the board's signals to a VCD file from now on; 0 if it cannot be written. */
 int rig_emulator_trace(rig_emulator *emulator, const char *file);
+void rig_emulator_end_trace(rig_emulator *emulator);
 
 /* --- what the emulator measured ---------------------------------------------------------------- */
 

@@ -211,6 +211,10 @@ class EmulatedBoard(SimulatedBoard):
         if not self._lib.rig_emulator_trace(self._board, str(file).encode()):
             raise BoardError(f"the trace {file} cannot be written; does its folder exist?")
 
+    def end_trace(self) -> None:
+        """Finish the file that `trace` began."""
+        self._lib.rig_emulator_end_trace(self._board)
+
     def stepper_figures(self) -> StepperFigures:
         """What the stepper driver noticed since power-on."""
         f = self._ffi.new("rig_stepper_figures *")

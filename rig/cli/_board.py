@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from rich.console import Console
-
-from rig.board.virtual import virtual_board
-from rig.cli._calculation import calculating
+from rig.board.virtual import ready_at_once, virtual_board
 from rig.link.bus import SlcanBus
 from rig.link.client import RigLink
 from rig.link.errors import LinkError
@@ -54,5 +51,4 @@ def _bus(bench: str, port: str | None) -> SlcanBus:
     board = workspace.bench(bench).board
     if isinstance(board, SerialBoard):
         return SlcanBus(SerialTransport(board.port, board.baudrate))
-    with calculating(Console(stderr=True)) as job:
-        return SlcanBus(virtual_board(workspace.setup(ACTUATOR, bench), 1, job))
+    return SlcanBus(virtual_board(ready_at_once(workspace.setup(ACTUATOR, bench)), 1))

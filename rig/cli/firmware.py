@@ -159,6 +159,48 @@ def identify(bench: Bench = "mega", port: Port = None, as_json: AsJson = False) 
         typer.echo(HINTS.get(status.fault, ""))
 
 
+@firmware.command()
+def trace(
+    file: Annotated[Path, typer.Argument(help="VCD file to write.")],
+    command: Annotated[
+        str, typer.Option(help="Command of the board to trace, as `home` or `zero_pressure`.")
+    ] = "home",
+    argument: Annotated[float, typer.Option(help="Of the command, in its unit.")] = 0.0,
+    seconds: Annotated[
+        float, typer.Option(min=0.001, max=60, help="How long, in bench time.")
+    ] = 1.0,
+    bench: Annotated[str, typer.Option(help="Bench with an emulated board.")] = "emulated",
+) -> None:
+    """Write what happens at the pins of the emulated Mega to a VCD file.
+
+    GTKWave and PulseView show it: step, direction, motor, valve, switches, HX711, transducer and
+    the serial line.
+
+    Example: `rig firmware trace homing.vcd --command home --seconds 2`
+    """
+    from rig.board.emulated import EmulatedBoard
+    from rig.board.virtual import ready_at_once, virtual_board
+    from rig.cli._board import ACTUATOR
+    from rig.link.bus import SlcanBus
+    from rig.link.client import RigLink
+    from rig.spec.bench import EmulatedBoard as EmulatedBoardSpec
+    from rig.spec.workspace import Workspace
+
+    setup = Workspace.find().setup(ACTUATOR, bench)
+    if not isinstance(setup.bench.board, EmulatedBoardSpec):
+        raise typer.BadParameter(f"the bench '{bench}' has no emulated board, whose pins are seen.")
+    board = virtual_board(ready_at_once(setup), 1)
+    assert isinstance(board, EmulatedBoard)
+    link = RigLink(SlcanBus(board))
+    link.open()
+    board.trace(file)
+    link.command(command, argument)
+    link.wait(seconds)
+    board.end_trace()
+    pulses = board.stepper_figures().pulses
+    typer.echo(f"{file}: {seconds:g} s of '{command}', {pulses} step pulses")
+
+
 # --- parameters -------------------------------------------------------------------------------
 
 

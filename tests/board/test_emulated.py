@@ -258,20 +258,6 @@ def test_a_held_data_line_of_the_load_cell_is_noticed(
 
 
 @needs_packages
-def test_the_signals_are_written_to_a_trace(setup: Setup, tmp_path: Path) -> None:
-    rig = Emulated(setup)
-    rig.board.trace(tmp_path / "board.vcd")
-    rig.link.command("home")
-    rig.link.wait(0.2)
-    pulses = rig.board.stepper_figures().pulses
-    rig.bench.close()
-    del rig
-    text = (tmp_path / "board.vcd").read_text(encoding="ascii")
-    assert "$var wire 1 ! step $end" in text
-    assert pulses > 100
-
-
-@needs_packages
 def test_a_trace_into_no_folder_is_refused(setup: Setup, tmp_path: Path) -> None:
     with pytest.raises(BoardError, match="trace"):
         Emulated(setup).board.trace(tmp_path / "none" / "board.vcd")

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 import stat
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from rig.board.emulator_build import missing_packages
 from rig.board.revision import firmware_revision
 from rig.board.virtual import virtual_board
 from rig.link.bus import SlcanBus
@@ -223,3 +225,48 @@ def test_everything_wrong_in_a_file_is_said_with_its_line(rig: Command, tmp_path
         "board.yaml:3:15: stuck",
     ):
         assert place in said
+
+
+# --- signals ------------------------------------------------------------------------------------
+
+
+def changes_of(text: str, signal: str) -> list[tuple[float, str]]:
+    """Times in s and values of a signal of one bit in a VCD file."""
+    assert "$timescale 10ns $end" in text
+    declared = re.search(rf"^\$var wire 1 (\S+) {signal} \$end$", text, re.MULTILINE)
+    assert declared is not None
+    changes, now = [], 0.0
+    for line in text[text.index("$enddefinitions") :].splitlines():
+        if line.startswith("#"):
+            now = int(line[1:]) * 10e-9
+        elif line[1:] == declared[1] and line[0] in "01":
+            changes.append((now, line[0]))
+    return changes
+
+
+@pytest.mark.skipif(bool(missing_packages()), reason="the emulator's packages are not installed")
+def test_the_pins_of_the_emulated_board_are_traced(rig: Command, tmp_path: Path) -> None:
+    file = tmp_path / "homing.vcd"
+    said = rig("firmware", "trace", str(file), "--seconds", "0.2").out
+    pulses = int(said.split()[-3])
+    steps = changes_of(file.read_text(encoding="ascii"), "step")
+    rises = [time for time, level in steps if level == "1"]
+    falls = [time for time, level in steps if level == "0"]
+    assert len(rises) == pulses > 300
+    assert min(f - r for r, f in zip(rises, falls[-len(rises) :], strict=True)) > 1.9e-6
+
+
+def test_a_board_without_pins_is_not_traced(rig: Command, tmp_path: Path) -> None:
+    outcome = rig("firmware", "trace", str(tmp_path / "x.vcd"), "--bench", "virtual")
+    assert outcome.code == 2
+    assert "no emulated board" in outcome.err
+
+
+def test_who_asks_the_board_waits_for_no_finite_elements(
+    rig: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise AssertionError("finite elements")
+
+    monkeypatch.setattr("rig.plant.specimen.finite_element_truth", refuse)
+    assert "virtual" in rig("firmware", "identify", "--bench", "virtual").out
