@@ -145,10 +145,10 @@ def blocked() -> Iterator[str]:
 
 
 def growth() -> Iterator[str]:
-    """Seconds against the number of equal convolutions, to an angle that grows with them."""
+    """Processor seconds against the number of equal convolutions, to an angle that grows with them."""
     numbers, seconds = [], []
     for number in NUMBERS:
-        start = time.perf_counter()
+        start = time.process_time()
         actuator = _actuator(
             geometry=BellowBendingGeometry(
                 family="bellow-bending",
@@ -160,7 +160,7 @@ def growth() -> Iterator[str]:
             actuator.model, [Point(p) for p in (0.0, 1e3, 2e3, 3e3)], options=FREE_OPTIONS
         )
         numbers.append(number)
-        seconds.append(time.perf_counter() - start)
+        seconds.append(time.process_time() - start)
         yield _row(f"{number} convolutions, {result.solves} systems", f"{seconds[-1]:.1f} s")
     exponent = np.polyfit(np.log(numbers), np.log(seconds), 1)[0]
     yield _row("exponent (target 1.3)", f"{exponent:.2f}")
