@@ -145,7 +145,7 @@ def blocked() -> Iterator[str]:
 
 
 def growth() -> Iterator[str]:
-    """Processor seconds against the number of equal convolutions, to an angle that grows with them."""
+    """Processor seconds against the number of equal convolutions; the angle grows with them."""
     numbers, seconds = [], []
     for number in NUMBERS:
         start = time.process_time()
