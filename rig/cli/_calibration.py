@@ -6,7 +6,7 @@ import csv
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from datetime import date, timedelta
+from datetime import date
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -17,6 +17,7 @@ from rich.markup import escape
 from rig.board.real import INSTRUCTIONS
 from rig.board.virtual_calibration import CELSIUS, VirtualCalibrationBench
 from rig.calibrate.points import Row, read_points
+from rig.cli._calibration_file import finish, folder, provenance
 from rig.cli._interruption import catching_signals
 from rig.errors import RigError
 from rig.experiment.bench import Fixture
@@ -29,7 +30,6 @@ from rig.link.client import RigLink
 from rig.link.open import open_bus
 from rig.spec.bench import BenchSpec, SerialBoard, VirtualReferences
 from rig.spec.calibration import Environment, Provenance
-from rig.spec.calibration_file import free_path, write_calibration
 from rig.spec.loading import AnyCalibration
 from rig.spec.workspace import BenchCalibrations, Workspace
 
@@ -97,7 +97,7 @@ class Task:
 
     def _take(self, procedure: Procedure, columns: Sequence[str]) -> list[Row]:
         parameters, rows = self.parameters, list[Row]()
-        kept = self._folder / "points" / f"{self.instrument}-{date.today()}.csv"
+        kept = folder(self.workspace) / "points" / f"{self.instrument}-{date.today()}.csv"
         kept = _free(kept)
 
         def taken(row: Row) -> None:
@@ -136,22 +136,15 @@ class Task:
             return RealCalibrationBench(self.bench.board, self.console)
         return VirtualCalibrationBench(self.bench, self.order.seed)
 
-    @property
-    def _folder(self) -> Path:
-        root = Path.cwd() if self.workspace.is_library else self.workspace.root
-        return root / "calibration"
-
     def provenance(self, method: str, instrument: str) -> Provenance:
         """Who calibrated what, when and against what; counts from today."""
-        today = date.today()
         ambient = self.bench.ambient.pressure if self.order.points is None else None
-        return Provenance(
-            date=today,
-            valid_until=today + timedelta(days=self.order.valid_days),
+        return provenance(
             method=method,
             instrument=instrument,
             serial_number=self.order.serial_number,
             operator=self.order.operator,
+            valid_days=self.order.valid_days,
             reference=f"{self.standard.name}, u = {100 * self.standard.u:.3g} % of reading",
             environment=Environment(
                 temperature=self.temperature_c,
@@ -161,18 +154,10 @@ class Task:
         )
 
     def finish(self, calibration: AnyCalibration, lines: Sequence[str], field: str) -> None:
-        """Write the calibration and say what it found; `field` of the bench names such files."""
-        path = self.order.out or free_path(self._folder, calibration, calibration.instrument)
-        write_calibration(calibration, path)
+        """Say what the calibration found and write it; `field` of the bench names such files."""
         for line in lines:
             self.console.print(escape(line), highlight=False)
-        valid = calibration.provenance.valid_until
-        self.console.print(
-            f"Written: {escape(str(path))}, valid until {valid}. Runs use it once the bench names "
-            f"it: {field}: {escape(path.stem)}",
-            soft_wrap=True,
-            highlight=False,
-        )
+        finish(self.console, self.workspace, calibration, self.order.out, field)
 
 
 def new_task(

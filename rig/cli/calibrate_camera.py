@@ -56,7 +56,7 @@ def camera(
     """
     from rich.console import Console
 
-    from rig.cli._calibration_files import finish, provenance
+    from rig.cli._calibration_file import finish, provenance, surroundings
     from rig.spec.target import CharucoTarget
     from rig.spec.workspace import Workspace
     from rig.vision.charuco import collect, coverage
@@ -72,6 +72,7 @@ def camera(
         return
     workspace = Workspace.find()
     spec = workspace.bench(bench)
+    simulated = spec.simulated and not pictures
     calibrations = workspace.resolve_bench(spec)
     source = _pictures(pictures, spec, calibrations.camera, target, seed, views)
     taken, size = collect(source, target, views, lambda text: console.print(text, markup=False))
@@ -80,14 +81,14 @@ def camera(
         console.print(f"The result would be better if you could {advice}.", markup=False)
     made = fit.calibration(
         provenance(
-            spec,
+            environment=surroundings(spec, simulated),
             method=f"ChArUco board, {columns}x{rows} squares of {square_mm:g} mm, {len(taken)} "
             "views; Zhang 2000",
             instrument=f"camera of the bench {spec.name}",
             serial_number=serial_number,
             operator=operator,
             valid_days=valid_days,
-            simulated=spec.simulated and not pictures,
+            simulated=simulated,
         )
     )
     for name, value, u in zip(NAMES, fit.values, fit.u, strict=True):
@@ -114,7 +115,7 @@ def _pictures(
     views: int,
 ) -> Iterator[Image]:
     """The pictures that were named, or those of the bench's camera."""
-    from rig.cli._calibration_files import frames_of_camera, frames_of_files
+    from rig.cli._pictures import frames_of_camera, frames_of_files
 
     if named:
         return frames_of_files(named)

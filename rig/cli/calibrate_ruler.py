@@ -54,12 +54,8 @@ def ruler(
     import numpy as np
     from rich.console import Console
 
-    from rig.cli._calibration_files import (
-        finish,
-        frames_of_camera,
-        frames_of_files,
-        provenance,
-    )
+    from rig.cli._calibration_file import finish, provenance, surroundings
+    from rig.cli._pictures import frames_of_camera, frames_of_files
     from rig.spec.calibration import CameraCalibration, Evidence, Fit
     from rig.spec.loading import read
     from rig.spec.workspace import Workspace
@@ -70,6 +66,7 @@ def ruler(
     console = Console()
     workspace = Workspace.find()
     spec = workspace.bench(bench)
+    simulated = spec.simulated and not pictures
     known = workspace.resolve_bench(spec)
     lens = known.camera if camera is None else read(camera, CameraCalibration).spec
     source: Iterable[Image]
@@ -90,13 +87,13 @@ def ruler(
             "pitch": known.ruler.pitch if pitch_mm is None else pitch_mm / 1e3,
             "pitch_u": known.ruler.pitch_u if pitch_u_mm is None else pitch_u_mm / 1e3,
             "provenance": provenance(
-                spec,
+                environment=surroundings(spec, simulated),
                 method=f"{shape.views} tilted views through a calibrated lens",
                 instrument="right-angle ruler",
                 serial_number=serial_number,
                 operator=operator,
                 valid_days=valid_days,
-                simulated=spec.simulated and not pictures,
+                simulated=simulated,
                 reference=reference,
             ),
             "evidence": Evidence(

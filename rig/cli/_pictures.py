@@ -1,0 +1,35 @@
+"""Where the pictures of a calibration come from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import cv2
+import numpy as np
+
+from rig.board.camera import open_camera
+from rig.spec.bench import BenchSpec
+from rig.spec.calibration import CameraCalibration
+from rig.vision.footage import expand, read_frames
+from rig.vision.segment import Image, as_image
+
+
+def frames_of_files(named: list[str]) -> Iterator[Image]:
+    """All frames of images, videos, folders and globs; raises VisionError."""
+    for file in expand(named):
+        for frame in read_frames(file):
+            yield frame.image
+
+
+def frames_of_camera(bench: BenchSpec, mode: CameraCalibration) -> Iterator[Image]:
+    """What a real bench's camera sees, in the mode of its present calibration.
+
+    Ends with Ctrl-C, or when nobody asks any more. Raises BoardError.
+    """
+    camera = open_camera(bench.camera, mode, lambda: 0.0)
+    try:
+        while True:
+            jpeg = camera.grab()[1]
+            yield as_image(cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR))
+    finally:
+        camera.close()
