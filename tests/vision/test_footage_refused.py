@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import struct
+import subprocess
+import sys
 import zlib
 from pathlib import Path
 
@@ -67,11 +69,13 @@ def test_a_pipe_is_refused_without_waiting_for_it(tmp_path: Path) -> None:
         list(read_frames(pipe))
 
 
-def test_decoders_write_nothing_about_a_broken_video(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_decoders_write_nothing_about_a_broken_video(tmp_path: Path) -> None:
     path = tmp_path / "broken.mp4"
     path.write_bytes(b"\0\0\0\x18ftypmp42" + bytes(range(256)) * 40)
-    with pytest.raises(VisionError):
-        list(read_frames(path))
-    assert capfd.readouterr().err == ""
+    # decoders decide how much they tell when a process first uses them: it takes a fresh one
+    told = subprocess.run(
+        [sys.executable, "-m", "rig", "measure", path], capture_output=True, text=True, check=False
+    )
+    assert told.returncode == 5
+    assert "moov" not in told.stderr
+    assert told.stderr.startswith("rig: ")
