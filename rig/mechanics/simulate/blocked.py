@@ -28,8 +28,10 @@ Array = NDArray[np.float64]
 
 STOP_STIFFNESS = 1e6
 """N/m of half the stop: it yields 0.2 um to 32 g."""
-BLOCKED_OPTIONS = Options(correction=2e-5, iterations=8, least_step=1 / 2, alternate=False)
-"""Steps of a whole rung take 2 to 6 iterations until a crease is near; where half of one fails,
+BLOCKED_OPTIONS = Options(
+    correction=2e-5, iterations=7, first_step=0.35, least_step=1 / 2, alternate=False
+)
+"""Steps of a whole rung take 2 to 4 iterations until a crease is near; where half of one fails,
 smaller ones only come closer to it, and plain iterations no further."""
 
 
