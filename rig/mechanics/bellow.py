@@ -206,8 +206,7 @@ class BellowShape:
     def cap_centre(self) -> Array:
         """Centre of mass of the end cap, (3,) in m."""
         end = self._end_section
-        along = self.effective_length + self.wall + self.cap_thickness / 2
-        return np.array([along, 0.0, float(end.moment / end.area)])
+        return np.array([self.tip - self.cap_thickness / 2, 0.0, float(end.moment / end.area)])
 
     @property
     def _end_section_area(self) -> float:

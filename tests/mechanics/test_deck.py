@@ -133,6 +133,18 @@ def test_weights_are_those_of_the_model_in_tonnes_and_millimetres(exported) -> N
     assert [step.parameters["NLGEOM"] for step in deck.all("STEP")] == ["YES", "YES"]
 
 
+def test_calculix_prints_at_equal_steps_of_pressure_wherever_its_increments_end(exported) -> None:
+    _, deck = exported
+    (times,) = deck.all("TIME POINTS")
+    assert "GENERATE" in times.parameters
+    (first, last, step) = (float(value) for value in times.lines[0])
+    assert first == step == pytest.approx(1 / 10)
+    assert last == 1
+    for keyword in ("NODE PRINT", "NODE FILE", "EL FILE"):
+        names = {block.parameters.get("TIME POINTS") for block in deck.all(keyword)}
+        assert names == {times.parameters["NAME"]}
+
+
 def test_abaqus_gets_hybrid_elements_and_turns_the_reference_node_itself(
     agilus30, tmp_path: Path
 ) -> None:
@@ -147,6 +159,7 @@ def test_abaqus_gets_hybrid_elements_and_turns_the_reference_node_itself(
     reference = rigid.parameters["REF NODE"]
     held = [line for line in deck.all("BOUNDARY")[0].lines if line[0] == reference]
     assert [line[1] for line in held] == ["2", "4", "6"]
+    assert not deck.all("TIME POINTS"), "Abaqus has them for other output only"
     # without gravity there is no step for it
     assert len(deck.all("STEP")) == 1
     assert not deck.all("CLOAD")

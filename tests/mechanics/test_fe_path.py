@@ -25,7 +25,9 @@ from rig.mechanics.fe import (
     gravity,
     rotation_vector,
 )
+from rig.mechanics.fe.control import PressureControl
 from rig.mechanics.fe.errors import SingularError
+from rig.mechanics.fe.frontal import Multifrontal
 from rig.mechanics.fe.linear import SuperLU
 from rig.mechanics.fe.newton import Target, solve_step
 from rig.mechanics.hyperelastic import (
@@ -85,6 +87,43 @@ def test_the_default_tolerance_leaves_no_trace_in_the_angle(tube, inflated) -> N
     quick = follow(tube.model, [Point(p) for p in PRESSURES])
     np.testing.assert_allclose(_angles(quick), _angles(inflated), rtol=2e-5)
     assert quick.solves < inflated.solves
+
+
+def test_the_first_step_of_a_path_is_as_short_as_told_and_the_others_are_not(tube) -> None:
+    points = [Point(p) for p in (0.0, 10 * KPA, 20 * KPA)]
+    result = follow(tube.model, points, options=replace(SHARP, first_step=0.35))
+    assert result.failure is None
+    taken = [(step.point, step.fraction) for step in result.history]
+    # on the way to the first point the dead load grows, too
+    assert taken == [(0, 1.0), (1, 0.35), (1, 1.0), (2, 1.0)]
+
+
+def test_where_it_was_told_not_to_alternate_a_failed_step_is_only_cut(tube) -> None:
+    few = Options(iterations=2, least_step=1 / 4)
+    for alternate in (True, False):
+        result = follow(tube.model, [Point(200 * KPA)], options=replace(few, alternate=alternate))
+        assert result.failure is not None
+        tried = [(step.fraction, step.mixed_points) for step in result.history]
+        expected = [(f, m) for f in (1.0, 0.5, 0.25) for m in ((True, False)[: 1 + alternate])]
+        assert tried == expected
+
+
+def test_a_step_that_arrives_leaves_out_the_last_tangent(tube, monkeypatch) -> None:
+    asked: list[bool] = []
+    assemble = tube.model.assemble
+
+    def watched(state, tangent=True):
+        asked.append(tangent)
+        return assemble(state, tangent)
+
+    monkeypatch.setattr(tube.model, "assemble", watched)
+    target = Target(10 * KPA, 1.0, 1.0)
+    outcome = solve_step(
+        tube.model, tube.model.start(), target, PressureControl(), Multifrontal(), SHARP
+    )
+    assert outcome.converged
+    assert not asked[-1]
+    assert asked.count(True) == len(outcome.iterations) - 1, "each iteration had its own"
 
 
 def test_volume_control_equals_pressure_control(tube, inflated) -> None:

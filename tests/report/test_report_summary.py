@@ -317,6 +317,14 @@ def test_a_model_that_ended_early_is_compared_where_it_answers(run_folder: Path)
     assert list(experiments["blocked_force"].models) == ["whole"]
 
 
+def test_noise_above_the_highest_set_point_asks_no_more_of_a_model(run_folder: Path) -> None:
+    analysis = analyse(RunReader(run_folder))
+    assert 10.0 < analysis.data.highest_kpa < 10.03
+    assert analysis.predictions["beam"].pressure[-1] == 10e3
+    errors = analysis.summary.experiments["deformation"].models["beam"].errors
+    assert errors[-1].pressure_kpa == 10
+
+
 def test_a_model_that_ends_between_points_of_its_curve_still_answers_at_its_end(
     run_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -112,7 +112,7 @@ class Bending:
         along, up = moved[:, 0] - self._start, moved[:, 2] - self._height
         radius = np.hypot(1 + curvature * up, curvature * along)
         angle = np.arctan2(curvature * along, 1 + curvature * up)
-        # a body may bend beyond half a turn
+        # near half a turn of the end some nodes are beyond it
         turns = curvature * (self._reference[:, 0] - self._start) - angle
         angle = angle + 2 * np.pi * np.round(turns / (2 * np.pi))
         straight = np.abs(angle) < _NEARLY_STRAIGHT**2

@@ -101,7 +101,7 @@ class MultifrontalFactor:
         """x with A x = `right`, (n,) or (n, k), refined once if round-off calls for it."""
         columns = right.reshape(len(right), -1)
         x = self._solve(columns)
-        # all columns at the size of the first in one product: the factors are the same for all
+        # one product tells of all columns, each at size one: they share their factors
         size = np.linalg.norm(columns, axis=0)
         weights = 1 / np.where(size > 0, size, 1.0)
         residual = columns @ weights - self._matrix @ (x @ weights)

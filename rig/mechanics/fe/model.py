@@ -135,6 +135,7 @@ class Model:
         self._motion[tied] = 0.0
         self.held = np.flatnonzero(held)
         self.tied = tied
+        """Degrees of freedom that follow a rigid body."""
         free = ~held
         free[tied] = False
         self.free = np.flatnonzero(free)

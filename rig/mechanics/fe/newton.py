@@ -50,7 +50,7 @@ class Options:
     """Smallest part of the way between two reported points before giving up."""
     first_step: float = 1.0
     """Part of the way to the next reported point that the first step along a path tries, which has
-    no others to be extrapolated from."""
+    no others to be extrapolated from; not where several loads change at once."""
     extrapolate: bool = True
     """Start each step from where the last ones point to."""
 

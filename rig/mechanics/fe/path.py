@@ -253,8 +253,8 @@ class _Run:
                 continue
             cuts += 1
             # now and then plain Newton with a line search gets where mixed points do not
-            alternate = self.options.mixed_points and self.options.alternate
-            mixed = self.options.mixed_points and (cuts % 2 == 0 or not alternate)
+            again = cuts % 2 == 0 or not self.options.alternate
+            mixed = self.options.mixed_points and again
             if mixed == self.options.mixed_points:
                 self._step = (fraction - done) / 2
             if self._step < self.options.least_step:
@@ -273,14 +273,22 @@ class _Run:
         self, target: Target, parameter: float, mixed: bool
     ) -> tuple[State, Assembly | None]:
         """Where to start from, and the assembly there if it was needed to find out."""
-        last = self._here
-        assert last is not None
-        current = self._with_points(last) if mixed else last
+        guess = self._extrapolated(target, parameter)
+        if guess is not None:
+            begin = self._with_points(guess, mixed)
+            found = self.model.assemble(begin)
+            if np.all(np.isfinite(found.residual)) and found.least_volume_ratio > 0:
+                return begin, found
+        assert self._here is not None
+        return self._with_points(self._here, mixed), None
+
+    def _extrapolated(self, target: Target, parameter: float) -> State | None:
+        """Where the last states point to; None where they do not point there."""
         if not self.options.extrapolate or len(self._past) < 2:
-            return current, None
+            return None
         knots = np.array([p for p, _ in self._past])
         if np.any(np.diff(knots) == 0) or (parameter - knots[-1]) * (knots[-1] - knots[-2]) <= 0:
-            return current, None
+            return None
         weights = _lagrange(knots, parameter)
         states = [s for _, s in self._past]
         x, poses = self.model.blended(states, weights, target.motion)
@@ -291,15 +299,12 @@ class _Run:
             PointState(blend(weights, [p.pressure for p in parts]))
             for parts in zip(*(s.points for s in states), strict=True)
         )
-        guess = State(x, points, poses, pressure, target.dead, target.motion)
-        if mixed:
-            guess = self._with_points(guess)
-        found = self.model.assemble(guess)
-        if not np.all(np.isfinite(found.residual)) or found.least_volume_ratio <= 0:
-            return current, None
-        return guess, found
+        return State(x, points, poses, pressure, target.dead, target.motion)
 
-    def _with_points(self, state: State) -> State:
+    def _with_points(self, state: State, mixed: bool) -> State:
+        """The state with strain and stress at its points independent, if they shall be."""
+        if not mixed:
+            return state
         return replace(
             state,
             points=tuple(

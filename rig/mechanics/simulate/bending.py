@@ -167,9 +167,6 @@ def bending_model_on(
         centre=shape.cap_centre,
         weight=weight * np.array(acceleration),
     )
-    along = Bending(
-        d, end, -shape.wall, shape.effective_length + shape.wall, height=shape.underside
-    )
     model = Model(
         d,
         [soft],
@@ -181,6 +178,10 @@ def bending_model_on(
         dead_load=gravity(soft, density, np.array(acceleration)),
         bodies=[end],
         items=items(d, shape) if items is not None else (),
-        coordinates=along if arc else None,
+        coordinates=Bending(
+            d, end, -shape.wall, shape.effective_length + shape.wall, height=shape.underside
+        )
+        if arc
+        else None,
     )
     return BendingModel(model, soft, shape, body.bottom_far_edge, density, acceleration)
