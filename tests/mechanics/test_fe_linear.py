@@ -64,6 +64,16 @@ def test_neighbours_with_other_rows_are_kept_apart() -> None:
     np.testing.assert_allclose(matrix @ x, right, atol=1e-11)
 
 
+def test_round_off_in_a_small_column_beside_a_large_one_is_refined(monkeypatch) -> None:
+    matrix = _shell(30, 8, 3, 0.1)
+    factor = Multifrontal().factorise(matrix)
+    exact = factor._solve
+    monkeypatch.setattr(factor, "_solve", lambda columns: exact(columns) * [1.0, 1 + 1e-6])
+    right = np.random.default_rng(4).standard_normal((matrix.shape[0], 2)) * [1.0, 1e-6]
+    miss = np.linalg.norm(matrix @ factor.solve(right) - right, axis=0)
+    assert np.all(miss < 1e-10 * np.linalg.norm(right, axis=0))
+
+
 def test_it_tells_whether_the_matrix_is_positive_definite() -> None:
     assert not Multifrontal().factorise(_shell(30, 10, 3, 0.0)).negative
     assert Multifrontal().factorise(_shell(30, 10, 3, -3.0)).negative
