@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from rig.board.virtual import Seeds, virtual_part
+from rig.plant.camera import CameraStreams
 from rig.plant.scene import Image
 from rig.plant.target import board_surfaces, ruler_surfaces, views
 from rig.spec.bench import BenchSpec
@@ -30,8 +31,7 @@ def ruler_views(
 
 def hidden_lean(bench: BenchSpec, seed: int) -> float:
     """By how many rad the legs of the bench's ruler are closer than a right angle."""
-    square = _camera(seed).spawn(6)[5]
-    return float(square.normal(0.0, virtual_part(bench).optics.ruler_squareness))
+    return CameraStreams.of(_camera(seed)).lean(virtual_part(bench).optics)
 
 
 def _camera(seed: int) -> np.random.Generator:

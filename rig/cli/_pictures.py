@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterable, Iterator
+from itertools import takewhile
 
 import cv2
 import numpy as np
 
 from rig.board.camera import open_camera
+from rig.cli._interruption import catching_signals
 from rig.spec.bench import BenchSpec
 from rig.spec.calibration import CameraCalibration
 from rig.vision.footage import expand, read_frames
 from rig.vision.segment import Image, as_image
+
+
+def until_interrupted(pictures: Iterable[Image]) -> Generator[Image, None, None]:
+    """The pictures, no further ones after Ctrl-C: what there is will be used."""
+    with catching_signals("taking the pictures that there are") as interruption:
+        yield from takewhile(lambda _: not interruption.requested, pictures)
 
 
 def frames_of_files(named: list[str]) -> Iterator[Image]:
@@ -24,7 +32,7 @@ def frames_of_files(named: list[str]) -> Iterator[Image]:
 def frames_of_camera(bench: BenchSpec, mode: CameraCalibration) -> Iterator[Image]:
     """What a real bench's camera sees, in the mode of its present calibration.
 
-    Ends with Ctrl-C, or when nobody asks any more. Raises BoardError.
+    Ends when nobody asks any more. Raises BoardError.
     """
     camera = open_camera(bench.camera, mode, lambda: 0.0)
     try:

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from rig.spec.bench import BenchSpec
-    from rig.spec.calibration import CameraCalibration
     from rig.spec.target import CharucoTarget
+    from rig.spec.workspace import Workspace
     from rig.vision.segment import Image
 
 
@@ -46,7 +46,7 @@ def camera(
     """Find focal length, centre and distortion of a camera from pictures of a flat board.
 
     Says where to hold the board next until the picture is covered and the board was tilted both
-    ways. Zoom, focus and resolution must be those of the runs.
+    ways, or until Ctrl-C. Zoom, focus and resolution must be those of the runs.
 
     Examples:
 
@@ -54,18 +54,25 @@ def camera(
 
         rig calibrate camera shots/*.png --bench mega --square-mm 15.97 --plot residuals.png
     """
+    from contextlib import closing
+
+    from pydantic import ValidationError
     from rich.console import Console
 
     from rig.cli._calibration_file import finish, provenance, surroundings
+    from rig.cli._pictures import until_interrupted
     from rig.spec.target import CharucoTarget
     from rig.spec.workspace import Workspace
     from rig.vision.charuco import collect, coverage
     from rig.vision.lens import NAMES, fit_lens
 
     console = Console()
-    target = CharucoTarget(
-        columns=columns, rows=rows, square=f"{square_mm} mm", marker=f"{marker_mm} mm"
-    )
+    try:
+        target = CharucoTarget(
+            columns=columns, rows=rows, square=f"{square_mm} mm", marker=f"{marker_mm} mm"
+        )
+    except ValidationError as error:
+        raise typer.BadParameter(f"the board: {error.errors()[0]['msg']}.") from None
     if board is not None:
         _write_board(target, board)
         console.print(f"Written: {board}. Print it flat; measure its squares.", markup=False)
@@ -73,9 +80,9 @@ def camera(
     workspace = Workspace.find()
     spec = workspace.bench(bench)
     simulated = spec.simulated and not pictures
-    calibrations = workspace.resolve_bench(spec)
-    source = _pictures(pictures, spec, calibrations.camera, target, seed, views)
-    taken, size = collect(source, target, views, lambda text: console.print(text, markup=False))
+    source = _pictures(pictures, workspace, spec, target, seed, views)
+    with closing(until_interrupted(source)) as shown:
+        taken, size = collect(shown, target, views, lambda text: console.print(text, markup=False))
     fit = fit_lens(taken, size)
     for advice in coverage(taken, size).advice:
         console.print(f"The result would be better if you could {advice}.", markup=False)
@@ -108,8 +115,8 @@ def camera(
 
 def _pictures(
     named: list[str] | None,
+    workspace: Workspace,
     bench: BenchSpec,
-    calibration: CameraCalibration,
     target: CharucoTarget,
     seed: int,
     views: int,
@@ -123,7 +130,8 @@ def _pictures(
         from rig.board.virtual_target import board_views
 
         return board_views(bench, target, seed, views)
-    return frames_of_camera(bench, calibration)
+    # what the camera is known by so far tells its mode
+    return frames_of_camera(bench, workspace.resolve_bench(bench).camera)
 
 
 def _write_board(target: CharucoTarget, path: Path) -> None:

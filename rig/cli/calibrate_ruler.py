@@ -13,7 +13,6 @@ from rig.cli.calibrate import calibrate
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from rig.vision.ruler import RulerMarks
     from rig.vision.segment import Image
 
 SHOWN = 3
@@ -51,15 +50,17 @@ def ruler(
 
     Example: `rig calibrate ruler tilted/*.png --bench mega --pitch-mm 10.002 --pitch-u-mm 0.005`
     """
+    from contextlib import closing
+
     import numpy as np
     from rich.console import Console
 
     from rig.cli._calibration_file import finish, provenance, surroundings
-    from rig.cli._pictures import frames_of_camera, frames_of_files
+    from rig.cli._pictures import frames_of_camera, frames_of_files, until_interrupted
     from rig.spec.calibration import CameraCalibration, Evidence, Fit
     from rig.spec.loading import read
     from rig.spec.workspace import Workspace
-    from rig.vision.squareness import fit_shape
+    from rig.vision.squareness import collect, fit_shape
 
     if (pitch_mm is None) != (pitch_u_mm is None):
         raise typer.BadParameter("--pitch-mm and --pitch-u-mm belong together")
@@ -78,7 +79,8 @@ def ruler(
         source = ruler_views(spec, known.ruler, seed, SHOWN * views)
     else:
         source = frames_of_camera(spec, lens)
-    shape = fit_shape(lens, _marks(source, known.ruler.marks, views))
+    with closing(until_interrupted(source)) as shown:
+        shape = fit_shape(lens, collect(shown, lens, known.ruler.marks, views))
     u_deg = float(np.hypot(shape.lean_u_deg, lens.angle_u_deg))
     made = known.ruler.model_copy(
         update={
@@ -118,20 +120,3 @@ def ruler(
         highlight=False,
     )
     finish(console, workspace, made, out, "camera.ruler")
-
-
-def _marks(pictures: Iterable[Image], marks: int, wanted: int) -> list[RulerMarks]:
-    """Views of the ruler, until there are enough; pictures without it are passed over."""
-    from rig.vision.errors import UntrustedFrameError
-    from rig.vision.ruler import find_ruler
-    from rig.vision.segment import pyramid
-
-    found: list[RulerMarks] = []
-    for picture in pictures:
-        try:
-            found.append(find_ruler(pyramid(picture), marks))
-        except UntrustedFrameError:
-            continue
-        if len(found) >= wanted:
-            break
-    return found

@@ -192,6 +192,10 @@ def trace(
     board = virtual_board(ready_at_once(setup), 1)
     assert isinstance(board, EmulatedBoard)
     link = RigLink(SlcanBus(board))
+    if command not in link.command_names:
+        raise typer.BadParameter(
+            f"the board has no command '{command}'; it has {', '.join(link.command_names)}."
+        )
     link.open()
     board.trace(file)
     link.command(command, argument)

@@ -336,6 +336,11 @@ class RigLink:
         """Whether `receive` raises BoardFaultError; off while making the bench safe."""
         self._raise_faults = enabled
 
+    @property
+    def command_names(self) -> tuple[str, ...]:
+        """What `command` takes."""
+        return tuple(self._opcodes)
+
     def command(self, opcode: str, argument: float = 0.0, timeout_s: float = 2.0) -> None:
         """Send a command and wait for its acknowledgement; it is sent again until then.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from enum import Enum
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from rig.mechanics.profile import side_profile
 from rig.plant.layout import ProfileFunction, lay_out
-from rig.plant.optics import draw_lens, draw_projection
+from rig.plant.optics import Lens, draw_lens, draw_projection
 from rig.plant.scene import Image, Light, Scene, Surface, linear
 from rig.spec.actuator import BellowBendingGeometry
 from rig.spec.bench import VirtualOptics
@@ -33,6 +34,30 @@ class CameraFault(Enum):
     """Something grey hides the end cap."""
     DARK = "dark"
     """The light is off."""
+
+
+class CameraStreams(NamedTuple):
+    """What draws each hidden part of one camera and of what stands before it."""
+
+    pose: np.random.Generator
+    light: np.random.Generator
+    cloth: np.random.Generator
+    noise: np.random.Generator
+    glass: np.random.Generator
+    square: np.random.Generator
+
+    @classmethod
+    def of(cls, rng: np.random.Generator) -> CameraStreams:
+        """Those of the camera that `rng` stands for."""
+        return cls(*rng.spawn(len(cls._fields)))
+
+    def lens(self, optics: VirtualOptics) -> Lens:
+        """The camera's lens."""
+        return draw_lens(optics.lens, self.glass)
+
+    def lean(self, optics: VirtualOptics) -> float:
+        """By how many rad the legs of the bench's ruler are closer than a right angle."""
+        return float(self.square.normal(0.0, optics.ruler_squareness))
 
 
 class SensorNoise:
@@ -87,12 +112,11 @@ class VirtualCamera:
         rng: np.random.Generator,
         profile: ProfileFunction = side_profile,
     ) -> None:
-        pose, light, cloth, noise, glass, square = rng.spawn(6)
-        lens = draw_lens(optics.lens, glass)
-        self.projection = draw_projection(lens, optics, pose)
-        lean = float(square.normal(0.0, optics.ruler_squareness))
+        streams = CameraStreams.of(rng)
+        lens = streams.lens(optics)
+        self.projection = draw_projection(lens, optics, streams.pose)
         layout = lay_out(geometry, ruler, self.projection, profile)
-        self.layout = replace(layout, ruler_lean=lean)
+        self.layout = replace(layout, ruler_lean=streams.lean(optics))
         self.fault = CameraFault.NONE
         self._geometry = geometry
         self._profile = profile
@@ -101,11 +125,11 @@ class VirtualCamera:
             self.layout,
             ruler,
             profile(geometry, 0.0).connector,
-            Light(optics.light_gradient, float(light.uniform(0, 2 * np.pi))),
+            Light(optics.light_gradient, float(streams.light.uniform(0, 2 * np.pi))),
             optics.blur,
-            cloth,
+            streams.cloth,
         )
-        self._noise = SensorNoise(lens.width, lens.height, optics.noise, noise)
+        self._noise = SensorNoise(lens.width, lens.height, optics.noise, streams.noise)
         # 4:2:2, as USB cameras send it; OpenCV would halve the colour in both directions.
         self._encoding = [
             cv2.IMWRITE_JPEG_QUALITY,

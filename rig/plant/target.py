@@ -10,10 +10,10 @@ from collections.abc import Iterable, Iterator, Sequence
 import cv2
 import numpy as np
 
-from rig.plant.camera import SensorNoise
+from rig.plant.camera import CameraStreams, SensorNoise
 from rig.plant.coverage import Box, Picture, bounding_box, coverage
 from rig.plant.layout import MARK_DIAMETER, RULER_WIDTH, mark_centres, ruler_outline
-from rig.plant.optics import Array, Lens, aim, draw_lens
+from rig.plant.optics import Array, Lens, aim
 from rig.plant.scene import (
     BACKGROUND,
     MARK_BLACK,
@@ -69,19 +69,21 @@ def views(
 
     `rng` in the state in which `VirtualCamera` takes it gives the same lens.
     """
-    hand, light, _, noise, glass = rng.spawn(5)
-    lens = draw_lens(optics.lens, glass)
-    sensor = SensorNoise(lens.width, lens.height, optics.noise, noise)
-    shade = Light(optics.light_gradient, float(light.uniform(0, 2 * np.pi)))
+    streams = CameraStreams.of(rng)
+    lens = streams.lens(optics)
+    sensor = SensorNoise(lens.width, lens.height, optics.noise, streams.noise)
+    shade = Light(optics.light_gradient, float(streams.light.uniform(0, 2 * np.pi)))
+    whole = Box(0, 0, lens.width, lens.height)
     for number in range(count):
-        placed, seen = _held(surfaces, size, lens, number, hand)
-        light_ = flat_light(placed, seen) * shade.field(lens.width, lens.height)
-        yield sensor.added(developed(light_, optics.blur), float(number))
+        # somebody's hand is as free as the camera's pose
+        placed = _held(surfaces, size, lens, number, streams.pose)
+        light = flat_light(placed, whole) * shade.field(lens.width, lens.height)
+        yield sensor.added(developed(light, optics.blur), float(number))
 
 
 def _held(
     surfaces: Iterable[Surface], size: Array, lens: Lens, number: int, rng: np.random.Generator
-) -> tuple[list[tuple[Array, Surface]], Box]:
+) -> list[tuple[Array, Surface]]:
     """Pixel outlines of the surfaces, the target held as the `number`th picture has it."""
     fill = _FILLS[number // 3 % len(_FILLS)]
     place = np.array(_PLACES[number % len(_PLACES)])
@@ -94,11 +96,10 @@ def _held(
     # shifted so far that the target's border comes to the picture's
     room = np.maximum(picture * distance / focal - size, 0.0)
     shift = 0.5 * room * place + rng.uniform(-0.1, 0.1, 2) * size
-    outlines = [
+    return [
         (projection.project(densified(surface.outline + shift, _STEP)), surface)
         for surface in surfaces
     ]
-    return outlines, Box(0, 0, lens.width, lens.height)
 
 
 def flat_light(outlines: Iterable[tuple[Array, Surface]], whole: Box) -> Picture:

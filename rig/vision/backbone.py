@@ -21,6 +21,7 @@ from rig.vision.segment import Image
 
 MIN_YELLOWNESS = 8.0  # grey levels: the print against neutral surroundings
 KEPT_SHARE = 0.5  # of the body's own yellowness: the middle of its edges
+MAX_GAP_PX = 12.0  # a soft body whose nearest pixel is further from a rigid part is another thing
 NEAR_PX = 4.0  # contour so much further from a rigid part than its nearest pixel is at the joint
 LOOSE_MM = 0.2  # beyond which points pull less: a dent, a thread
 END_SHARE = 0.12  # of the chain at each end: end walls are rigid, and blue shines into them
@@ -91,6 +92,8 @@ def _free_edge(contour: FloatArray, seen: Sighting) -> FloatArray:
     Ways lie between what of the contour is next to one part and what is next to the other.
     """
     gaps = [_gaps(contour, part.outline) for part in (seen.connector, seen.cap)]
+    if any(gap.min() > MAX_GAP_PX for gap in gaps):
+        raise UntrustedFrameError("the soft body does not reach from connector to end cap")
     near = [gap < NEAR_PX + gap.min() for gap in gaps]
     turned = np.roll(np.arange(len(contour)), -int(np.flatnonzero(near[0])[0]))
     at_connector, at_cap = near[0][turned], near[1][turned]

@@ -16,6 +16,7 @@ from rig.spec.target import CharucoTarget
 from rig.vision.errors import VisionError
 from rig.vision.lines import FloatArray
 from rig.vision.segment import Image, as_image
+from rig.vision.views import alike
 
 MIN_CORNERS = 8
 """A view with fewer tells more of its pose than of the lens."""
@@ -23,8 +24,6 @@ GRID = 3
 """Cells across and down in which the picture is to be covered."""
 MIN_CELL_CORNERS = 12
 MIN_VIEWS = 10
-SAME_SHARE = 0.02
-"""Of the picture's width: a board that has moved less is seen no differently."""
 TILTED_VIEWS = 3
 MIN_LEAN = 0.2
 """Of the board's normal, about 12 deg; head-on views alone do not tell the focal length."""
@@ -100,7 +99,9 @@ def collect(
             )
         size = here
         view = find_board(picture, target)
-        if view is None or any(_alike(view, other, size) for other in views):
+        if view is None or any(
+            alike(view.board, view.pixels, other.board, other.pixels, size[0]) for other in views
+        ):
             continue
         views.append(view)
         advice = coverage(views, size).advice
@@ -114,23 +115,12 @@ def collect(
     return views, size
 
 
-def _alike(one: View, other: View, size: tuple[int, int]) -> bool:
-    """Whether the board has hardly moved between two views."""
-    places = {tuple(place): pixel for place, pixel in zip(one.board, one.pixels, strict=True)}
-    moved = [
-        np.hypot(*(pixel - places[tuple(place)]))
-        for place, pixel in zip(other.board, other.pixels, strict=True)
-        if tuple(place) in places
-    ]
-    return bool(moved) and float(np.mean(moved)) < SAME_SHARE * size[0]
-
-
 def coverage(views: list[View], size: tuple[int, int]) -> Coverage:
     """What `views` cover of pictures of `size` (width, height)."""
     cells = np.zeros((GRID, GRID))
     leaning = np.zeros(2, dtype=int)
-    matrix = np.array([[ROUGH_FOCAL * size[0], 0, size[0] / 2], [0, 0, size[1] / 2], [0, 0, 1.0]])
-    matrix[1, 1] = matrix[0, 0]
+    focal = ROUGH_FOCAL * size[0]
+    matrix = np.array([[focal, 0, size[0] / 2], [0, focal, size[1] / 2], [0, 0, 1.0]])
     for view in views:
         column, row = (view.pixels / size * GRID).astype(int).clip(0, GRID - 1).T
         np.add.at(cells, (row, column), 1)

@@ -15,7 +15,7 @@ from rig.spec.calibration import CameraCalibration, RulerCalibration
 from rig.vision.errors import UntrustedFrameError, VisionError
 from rig.vision.lines import FloatArray
 from rig.vision.motion import ConstantVelocity
-from rig.vision.plane import PicturePlane, rectify
+from rig.vision.plane import PicturePlane, rectify, require_picture
 from rig.vision.ruler import find_ruler
 from rig.vision.segment import Image, pyramid
 
@@ -27,8 +27,9 @@ GATE_SIGMAS = 5.0
 LOST_AFTER_S = 0.25
 FIXED_MOVE_PX = 1.0
 """If the marker at the fixed end has moved by more, so has the camera."""
-MARGIN_SIDES = 0.6
-"""White and background around a marker that its detection needs, in sides."""
+MARGIN_SIDES = 2.0
+"""Around a marker its detection needs white and the border of a picture at some distance, in
+sides: with less it is not found in a window of its own."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,11 @@ class DisplacementTracker:
         self._track: _Track | None = None
 
     def measure(self, image_bgr: Image, time_s: float) -> DisplacementMeasurement:
-        """Displacement at `time_s`, which must grow; raises VisionError for times that do not."""
+        """Displacement at `time_s`, which must grow.
+
+        Raises VisionError for times that do not, and for what is no picture of the camera.
+        """
+        require_picture(image_bgr, self._camera)
         if self._track is not None and time_s <= self._track.time_s:
             raise VisionError(
                 f"A frame at {time_s:g} s follows one at {self._track.time_s:g} s; expected "
@@ -112,7 +117,8 @@ class DisplacementTracker:
             found |= _markers(image, self._zero.fixed_px, reach)
             found |= _markers(image, expected.values, reach + moved)
         if any(name not in found for name in self._names):
-            found = _markers(image, 0.5 * np.array(image.shape[1::-1]), float(max(image.shape)))
+            everywhere = 0.5 * np.array(image.shape[1::-1]), float(max(image.shape))
+            found = _markers(image, *everywhere) | found
         missing = [str(name) for name in self._names if name not in found]
         if missing:
             raise UntrustedFrameError(f"marker {' and '.join(missing)} not found: hidden, blurred?")

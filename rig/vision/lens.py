@@ -20,6 +20,8 @@ NAMES = ("focal_x", "focal_y", "centre_x", "centre_y", "k1", "k2", "p1", "p2")
 MIN_VIEWS = 5
 MAX_RMS_PX = 1.0
 """Worse fits are of a board that is not flat, not as said, or of unsharp pictures."""
+MAX_FOCAL_U = 0.02
+"""Relative standard uncertainty of the focal lengths; head-on views alone leave far more."""
 DRAWS = 40
 """Lenses drawn from the covariance to see what they make of angles."""
 GRID = 9
@@ -117,14 +119,23 @@ def fit_lens(views: list[View], size: tuple[int, int]) -> LensFit:
     for view, turn, move in zip(views, turns, moves, strict=True):
         fitted, jacobian = cv2.projectPoints(_flat(view), turn, move, matrix, coefficients)
         residuals.append(view.pixels - fitted.reshape(-1, 2))
-        pose, lens = jacobian[:, :6], jacobian[:, 6 : 6 + len(NAMES)]
-        across = pose.T @ lens
-        normal += lens.T @ lens - across.T @ np.linalg.solve(pose.T @ pose, across)
+        slopes = np.asarray(jacobian, dtype=np.float64)
+        normal += _told_of_the_lens(slopes[:, :6], slopes[:, 6 : 6 + len(NAMES)])
     freedom = 2 * sum(map(len, residuals)) - len(NAMES) - 6 * len(views)
     misfit = float(sum((left**2).sum() for left in residuals))
     values = [matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], *coefficients[:4]]
     scale = np.diag(1.0 / np.sqrt(np.diag(normal)))  # pixels and distortions differ by 1e6
-    covariance = scale @ np.linalg.inv(scale @ normal @ scale) @ scale * misfit / freedom
+    try:
+        covariance = scale @ np.linalg.inv(scale @ normal @ scale) @ scale * misfit / freedom
+    except np.linalg.LinAlgError:
+        covariance = np.full_like(normal, np.inf)
+    u_focal = np.sqrt(np.abs(np.diag(covariance)[:2]))
+    if not np.all(u_focal < MAX_FOCAL_U * np.array(values[:2])):
+        raise VisionError(
+            "The views do not tell the focal length from the distance: its standard uncertainty is "
+            f"above {MAX_FOCAL_U:.0%}. Turn the board's face by 20 deg or more in some, left or "
+            "right and up or down."
+        )
     fit = LensFit(
         size,
         np.array(values, dtype=np.float64),
@@ -139,6 +150,13 @@ def fit_lens(views: list[View], size: tuple[int, int]) -> LensFit:
             f"{MAX_RMS_PX:g}. Is the board flat, sharp, and of the size that was named?"
         )
     return fit
+
+
+def _told_of_the_lens(pose: FloatArray, lens: FloatArray) -> FloatArray:
+    """Normal matrix of the lens from one view's derivatives by its pose and by the lens."""
+    across = pose.T @ lens
+    told: FloatArray = lens.T @ lens - across.T @ np.linalg.lstsq(pose, lens, rcond=None)[0]
+    return told
 
 
 def angle_u(fit: LensFit) -> float:

@@ -15,9 +15,9 @@ import numpy as np
 
 from rig.spec.calibration import CameraCalibration, RulerCalibration
 from rig.vision.edges import LONG_SHARE, Edge, edges_along, long_edges
-from rig.vision.errors import UnsharpFrameError, UntrustedFrameError, VisionError
+from rig.vision.errors import UnsharpFrameError, UntrustedFrameError
 from rig.vision.lines import FloatArray
-from rig.vision.plane import PicturePlane, rectify
+from rig.vision.plane import PicturePlane, rectify, require_picture
 from rig.vision.ruler import find_ruler
 from rig.vision.segment import (
     BluePart,
@@ -171,7 +171,7 @@ class AngleMeter:
         Raises VisionError for an array that is no such image, or whose size is not that of the
         camera calibration; whatever is wrong with the picture itself is a rejection.
         """
-        self._check(image_bgr)
+        require_picture(image_bgr, self.camera)
         return self._measure(pyramid(image_bgr))
 
     def check_ruler(self, image_bgr: Image) -> RulerCheck:
@@ -181,7 +181,7 @@ class AngleMeter:
         VisionError as `measure`.
         """
         assert self.ruler is not None
-        self._check(image_bgr)
+        require_picture(image_bgr, self.camera)
         try:
             marks = find_ruler(pyramid(image_bgr), self.ruler.marks)
             plane = rectify(self.camera, self.ruler, marks)
@@ -199,7 +199,7 @@ class AngleMeter:
         profile, and the plane of the picture to be the same. The cap is sought `move` (2,) px from
         where `last` saw it, give or take `margin`. Raises VisionError as `measure` does.
         """
-        self._check(image_bgr)
+        require_picture(image_bgr, self.camera)
         frame = _Frame()
         try:
             box = np.reshape(last.cap.box, (2, 2)) + move
@@ -246,20 +246,6 @@ class AngleMeter:
             "centre_y": 0.5 * self.camera.centre_y - 0.25,
         }
         return replace(self, camera=self.camera.model_copy(update=half))
-
-    def _check(self, image: Image) -> None:
-        if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8 or not image.size:
-            raise VisionError(
-                f"Expected a colour image of shape (height, width, 3) with 8 bits a channel, got "
-                f"shape {image.shape} of {image.dtype}; convert it to 8-bit BGR first."
-            )
-        height, width = image.shape[:2]
-        if self.camera and (self.camera.width, self.camera.height) != (width, height):
-            raise VisionError(
-                f"The image is {width}x{height}, but the camera calibration is for "
-                f"{self.camera.width}x{self.camera.height}; use the calibration of this camera "
-                "mode, or none."
-            )
 
     def _angle(self, levels: list[Image], frame: _Frame) -> tuple[float, float]:
         """Angle and standard uncertainty in deg; notes in `frame` what it finds on the way."""

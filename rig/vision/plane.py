@@ -13,13 +13,29 @@ import cv2
 import numpy as np
 
 from rig.spec.calibration import CameraCalibration, RulerCalibration
-from rig.vision.errors import UntrustedFrameError
+from rig.vision.errors import UntrustedFrameError, VisionError
 from rig.vision.lines import FloatArray
 from rig.vision.ruler import RulerMarks
+from rig.vision.segment import Image
 
 MAX_RESIDUAL_PX = 1.0  # rms: worse marks are no plane grid, or belong to another ruler
 MARK_FLOOR_PX = 0.02  # centroid noise assumed at least
 GAUSS_NEWTON_STEPS = 2  # quadratic convergence from the linear solution, pixels away at most
+
+
+def require_picture(image: Image, camera: CameraCalibration | None) -> None:
+    """Raises VisionError for what is no 8-bit BGR picture, or not of the camera's mode."""
+    if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8 or not image.size:
+        raise VisionError(
+            f"Expected a colour image of shape (height, width, 3) with 8 bits a channel, got "
+            f"shape {image.shape} of {image.dtype}; convert it to 8-bit BGR first."
+        )
+    height, width = image.shape[:2]
+    if camera and (camera.width, camera.height) != (width, height):
+        raise VisionError(
+            f"The image is {width}x{height}, but the camera calibration is for "
+            f"{camera.width}x{camera.height}; use the calibration of this camera mode, or none."
+        )
 
 
 @dataclass(frozen=True)

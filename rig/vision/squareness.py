@@ -6,6 +6,7 @@ tilted view tells a lean from perspective, a square one alone could not.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import cv2
@@ -13,10 +14,12 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from rig.spec.calibration import CameraCalibration
-from rig.vision.errors import VisionError
+from rig.vision.errors import UntrustedFrameError, VisionError
 from rig.vision.lines import FloatArray
-from rig.vision.plane import PicturePlane
-from rig.vision.ruler import RulerMarks
+from rig.vision.plane import PicturePlane, require_picture
+from rig.vision.ruler import RulerMarks, find_ruler
+from rig.vision.segment import Image, pyramid
+from rig.vision.views import alike
 
 MIN_VIEWS = 4
 MAX_RMS_PX = 0.5
@@ -48,12 +51,35 @@ class RulerShape:
         return float(np.sqrt(self.covariance[1, 1]))
 
 
+def collect(
+    pictures: Iterable[Image], camera: CameraCalibration, marks: int, wanted: int
+) -> list[RulerMarks]:
+    """Views of a ruler with `marks` on each leg, until there are `wanted`.
+
+    Pictures without it are passed over, and such as are like one before. Raises VisionError for
+    pictures that are not of the camera's mode.
+    """
+    views: list[RulerMarks] = []
+    for picture in pictures:
+        require_picture(picture, camera)
+        try:
+            view = find_ruler(pyramid(picture), marks)
+        except UntrustedFrameError:
+            continue
+        if any(alike(view.grid, view.pixels, o.grid, o.pixels, camera.width) for o in views):
+            continue
+        views.append(view)
+        if len(views) >= wanted:
+            break
+    return views
+
+
 def fit_shape(camera: CameraCalibration, views: list[RulerMarks]) -> RulerShape:
     """Least squares over all views; raises VisionError for too few, and for a bad fit."""
     if len(views) < MIN_VIEWS:
         raise VisionError(
-            f"The ruler was found in {len(views)} pictures; expected {MIN_VIEWS} or more, tilted "
-            "in different directions."
+            f"The ruler was found in {len(views)} pictures that differ; expected {MIN_VIEWS} or "
+            "more, tilted in different directions."
         )
     lens = PicturePlane(camera)
     focal = np.array([camera.focal_x, camera.focal_y])

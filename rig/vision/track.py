@@ -179,7 +179,13 @@ class _Track:
             f"{GATE_SIGMAS * self.u_angle_deg:.1f} deg is expected from the frames before"
         )
         return replace(
-            result, angle_deg=None, u_deg=0.0, quality=0.0, accepted=False, reason=reason
+            result,
+            angle_deg=None,
+            u_deg=0.0,
+            quality=0.0,
+            accepted=False,
+            reason=reason,
+            sighting=None,
         )
 
     def reach(self) -> tuple[FloatArray, float]:

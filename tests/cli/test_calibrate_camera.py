@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import signal
+
 import numpy as np
 import pytest
 
 from rig.board.virtual import Seeds
-from rig.board.virtual_target import hidden_lean
-from rig.plant.optics import draw_lens
+from rig.board.virtual_target import board_views, hidden_lean
+from rig.plant.camera import CameraStreams
 from rig.spec.calibration import CameraCalibration, RulerCalibration
 from rig.spec.loading import read
+from rig.spec.target import CharucoTarget
 from rig.spec.workspace import Workspace
 from tests.cli.conftest import rig  # noqa: F401
 
@@ -18,7 +21,7 @@ SEED = 3
 
 def hidden_lens():
     optics = Workspace.find().bench("virtual").virtual.optics
-    return draw_lens(optics.lens, np.random.default_rng(Seeds.of(SEED, 0).camera).spawn(5)[4])
+    return CameraStreams.of(np.random.default_rng(Seeds.of(SEED, 0).camera)).lens(optics)
 
 
 def test_the_lens_of_the_bench_is_found_within_its_uncertainty(rig, tmp_path):  # noqa: F811
@@ -69,6 +72,45 @@ def test_the_board_can_be_printed(rig, tmp_path):  # noqa: F811
     outcome = rig("calibrate", "camera", "--board", tmp_path / "no" / "board.png")
     assert outcome.code != 0
     assert "cannot be written" in " ".join(outcome.err.split())
+
+
+def test_a_board_that_cannot_be_is_refused(rig):  # noqa: F811
+    for wrong in (("--square-mm", "10", "--marker-mm", "12"), ("--columns", "20", "--rows", "20")):
+        outcome = rig("calibrate", "camera", *wrong)
+        assert outcome.code == 2
+        assert "expected" in outcome.err
+        assert "defect" not in outcome.err
+
+
+def test_after_ctrl_c_the_lens_is_fitted_to_what_there_is(
+    rig,  # noqa: F811
+    tmp_path,
+    monkeypatch,
+):
+    bench = Workspace.find().bench("virtual")
+
+    def filmed(named):
+        for number, picture in enumerate(board_views(bench, CharucoTarget(), SEED, 12)):
+            assert number < 12
+            if number == 10:
+                signal.raise_signal(signal.SIGINT)
+            yield picture
+
+    monkeypatch.setattr("rig.cli._pictures.frames_of_files", filmed)
+    file = tmp_path / "camera.yaml"
+    outcome = rig("calibrate", "camera", "film.mp4", "--views", 30, "--out", file)
+    assert outcome.code == 0, outcome.err
+    made = read(file, CameraCalibration).spec
+    assert len(made.evidence.rows) == 10
+
+
+def test_the_first_calibration_of_a_camera_needs_no_other(rig, tmp_path, monkeypatch):  # noqa: F811
+    def nothing_there(*_):
+        raise AssertionError("the bench's calibrations were asked for")
+
+    monkeypatch.setattr(Workspace, "resolve_bench", nothing_there)
+    outcome = rig("calibrate", "camera", tmp_path / "none*.png", "--bench", "mega")
+    assert "matches no file" in outcome.err
 
 
 def test_pictures_without_a_board_are_refused(rig, tmp_path):  # noqa: F811

@@ -256,6 +256,13 @@ def test_the_pins_of_the_emulated_board_are_traced(rig: Command, tmp_path: Path)
     assert min(f - r for r, f in zip(rises, falls[-len(rises) :], strict=True)) > 1.9e-6
 
 
+def test_a_command_that_the_board_does_not_have_is_not_traced(rig: Command, tmp_path: Path) -> None:
+    outcome = rig("firmware", "trace", str(tmp_path / "x.vcd"), "--command", "nosuch")
+    assert outcome.code == 2
+    assert "no command 'nosuch'" in outcome.err
+    assert not (tmp_path / "x.vcd").exists()
+
+
 def test_a_board_without_pins_is_not_traced(rig: Command, tmp_path: Path) -> None:
     outcome = rig("firmware", "trace", str(tmp_path / "x.vcd"), "--bench", "virtual")
     assert outcome.code == 2

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from rig.board.virtual import Seeds, virtual_part
 from rig.mechanics.profile import side_profile
+from rig.plant.camera import CameraStreams
 from rig.plant.layout import lay_out, mark_centres
-from rig.plant.optics import draw_lens, draw_projection
+from rig.plant.optics import draw_projection
 from rig.spec.actuator import BellowBendingGeometry
 from rig.vision.plane import rectify
 from rig.vision.ruler import RulerMarks
@@ -42,8 +43,8 @@ def test_the_lens_is_as_uncertain_as_the_benches_lenses_scatter() -> None:
     grid[1 : ruler.marks + 1, 1], grid[ruler.marks + 1 :, 0] = -steps, steps
     layout, errors = None, []
     for seed in range(LENSES):
-        pose, _, _, _, glass, _ = np.random.default_rng(Seeds.of(seed, 0).camera).spawn(6)
-        projection = draw_projection(draw_lens(optics.lens, glass), optics, pose)
+        streams = CameraStreams.of(np.random.default_rng(Seeds.of(seed, 0).camera))
+        projection = draw_projection(streams.lens(optics), optics, streams.pose)
         layout = layout or lay_out(geometry, ruler, projection, side_profile)
         marks = projection.project(mark_centres(layout.ruler_corner, ruler))
         plane = rectify(known, ruler, RulerMarks(marks, grid))

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from datetime import date
 
 import cv2
 import numpy as np
@@ -20,19 +19,10 @@ from rig.plant.layout import RULER_WIDTH, Layout, ruler_outline
 from rig.plant.optics import Projection, aim
 from rig.plant.scene import BACKGROUND, Light, Scene, Surface
 from rig.spec.actuator import BellowBendingGeometry
-from rig.spec.calibration import CameraCalibration, Provenance, RulerCalibration
+from rig.spec.calibration import CameraCalibration
 from rig.vision.measure import AngleMeasurement, AngleMeter, Side
+from tests.vision.synthetic import PROVENANCE, RULER
 
-PROVENANCE = Provenance(date=date(2025, 1, 1), method="rendered", instrument="test")
-RULER = RulerCalibration(
-    kind="calibration",
-    instrument="ruler",
-    pitch="10 mm",
-    marks=7,
-    pitch_u="0.02 mm",
-    squareness_u_deg=0.0,
-    provenance=PROVENANCE,
-)
 GEOMETRY = BellowBendingGeometry(family="bellow-bending")
 RESOLUTIONS = ((640, 480), (800, 600), (1280, 720), (1280, 960), (1920, 1080))
 FOCAL_U, CENTRE_U, K1_U = 2e-3, 2.0, 5e-3

@@ -52,6 +52,16 @@ def test_without_a_body_there_is_no_backbone(seen_camera):
         fit_backbone(grey, seen)
 
 
+def test_a_yellow_thing_beside_a_grey_body_is_no_backbone(seen_camera):
+    image, seen, _ = backbone(seen_camera, 60.0)
+    grey = image.copy()
+    grey[:] = image.mean(axis=2, keepdims=True)
+    low, high = (int(s * image.shape[0]) for s in (0.80, 0.97))
+    grey[low:high, 20:700] = (150, 200, 212)
+    with pytest.raises(UntrustedFrameError, match="does not reach from connector to end cap"):
+        fit_backbone(grey, seen)
+
+
 def test_without_a_ruler_there_is_no_scale(seen_camera):
     image = frame(seen_camera, 40.0)
     seen = AngleMeter(CALIBRATIONS.camera).measure(image).sighting

@@ -14,6 +14,7 @@ from rig.plant.optics import Lens, aim
 from rig.plant.scene import developed
 from rig.plant.target import flat_light, marker_surfaces, ruler_surfaces
 from rig.spec.workspace import Workspace
+from rig.vision import displacement
 from rig.vision.displacement import DisplacementTracker
 from rig.vision.errors import VisionError
 
@@ -107,6 +108,38 @@ def test_a_marker_that_jumps_is_rejected(picture, tracker):
     jumped = tracker.measure(picture(4 / 240, jump_mm=15.0), 4 / 240)
     assert not jumped.accepted
     assert "jumps to" in jumped.reason
+
+
+def test_after_the_first_frame_only_the_markers_surroundings_are_searched(
+    picture, tracker, monkeypatch
+):
+    whole = []
+    seek = displacement._markers
+
+    def counted(image, middle, reach):
+        whole.append(reach >= max(image.shape))
+        return seek(image, middle, reach)
+
+    monkeypatch.setattr(displacement, "_markers", counted)
+    for time in np.arange(6) / 120:
+        assert tracker.measure(picture(time), float(time)).accepted
+    assert whole[0]
+    assert not any(whole[1:])
+
+
+def test_a_camera_that_was_knocked_is_noticed_at_the_fixed_marker(picture, tracker):
+    assert tracker.measure(picture(0.0), 0.0).accepted
+    knocked = tracker.measure(np.roll(picture(1 / 120), 2, axis=1), 1 / 120)
+    assert not knocked.accepted
+    assert "fixed end has moved" in knocked.reason
+
+
+@pytest.mark.parametrize(
+    "other", [np.zeros((480, 640), np.uint8), np.zeros((720, 960, 3), np.uint8)]
+)
+def test_what_is_no_picture_of_the_camera_is_refused(tracker, other):
+    with pytest.raises(VisionError, match=r"Expected a colour image|The image is 960x720"):
+        tracker.measure(other, 0.0)
 
 
 def test_frames_out_of_order_are_refused(picture, tracker):

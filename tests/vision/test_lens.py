@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rig.plant.camera import CameraStreams
 from rig.plant.optics import Lens, aim, draw_lens
 from rig.plant.target import board_surfaces, ruler_surfaces, views
 from rig.spec.calibration import Provenance
 from rig.spec.target import CharucoTarget
 from rig.spec.workspace import Workspace
+from rig.vision import squareness
 from rig.vision.charuco import GRID, View, board_picture, collect, coverage, find_board
 from rig.vision.errors import VisionError
 from rig.vision.lens import NAMES, LensFit, fit_lens
@@ -22,7 +24,8 @@ from rig.vision.squareness import fit_shape
 LIBRARY = Workspace(Path(__file__).parents[2])
 BENCH = LIBRARY.bench("virtual")
 OPTICS = BENCH.virtual.optics
-RULER = LIBRARY.resolve_bench(BENCH).ruler
+CALIBRATIONS = LIBRARY.resolve_bench(BENCH)
+RULER = CALIBRATIONS.ruler
 TARGET = CharucoTarget()
 SIZE = (1280, 720)
 NOISE_PX = 0.05
@@ -108,7 +111,7 @@ def test_corners_in_pictures_are_where_the_lens_puts_them(pictures):
     """A flat board's corners fit a homography of undistorted pixels to a twentieth of a pixel."""
     import cv2
 
-    lens = draw_lens(OPTICS.lens, np.random.default_rng(3).spawn(5)[4])
+    lens = CameraStreams.of(np.random.default_rng(3)).lens(OPTICS)
     matrix = np.array(
         [[lens.focal_x, 0, lens.centre_x], [0, lens.focal_y, lens.centre_y], [0, 0, 1]]
     )
@@ -206,3 +209,32 @@ def test_the_lean_of_a_ruler_is_recovered(lean_deg):
     assert shape.ratio == pytest.approx(1.0, abs=3.0 * shape.ratio_u)
     with pytest.raises(VisionError, match="found in 3 pictures"):
         fit_shape(camera, found[:3])
+
+
+def test_pictures_that_are_alike_count_once_for_a_ruler():
+    """Twenty frames of one pose hold the same errors of lens and marks twenty times."""
+    surfaces, size = ruler_surfaces(RULER, 5e-4)
+    (picture,) = views(surfaces, size, OPTICS, np.random.default_rng(3), 1)
+    found = squareness.collect(20 * [picture], CALIBRATIONS.camera, RULER.marks, 20)
+    assert len(found) == 1
+    with pytest.raises(VisionError, match="found in 1 pictures that differ"):
+        fit_shape(CALIBRATIONS.camera, found)
+
+
+def test_pictures_of_another_mode_than_the_lens_s_are_refused():
+    half = np.zeros((360, 640, 3), np.uint8)
+    with pytest.raises(VisionError, match="The image is 640x360, but the camera calibration is"):
+        squareness.collect([half], CALIBRATIONS.camera, RULER.marks, 20)
+
+
+def test_head_on_views_are_no_calibration_of_a_lens():
+    lens = Lens(1280, 720, 2100.0, 2100.0, 640.0, 360.0, (-0.1, 0.05, 0.0, 0.0, 0.0))
+    rng = np.random.default_rng(11)
+    across, down = np.meshgrid(np.arange(8), np.arange(5))
+    corners = 0.016 * np.column_stack([across.ravel(), down.ravel()]) - [0.056, 0.032]
+    square_on = []
+    for distance in np.linspace(0.3, 0.36, 9):
+        pixels = aim(lens, float(distance), 0.0, 0.0, 0.0).project(corners)
+        square_on.append(View(corners, pixels + 0.03 * rng.standard_normal(pixels.shape)))
+    with pytest.raises(VisionError, match="do not tell the focal length from the distance"):
+        fit_lens(square_on, (1280, 720))

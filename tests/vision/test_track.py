@@ -114,6 +114,7 @@ def test_an_angle_that_jumps_is_refused_until_the_track_is_lost(meter, film):
     found = follow(tracker, images)
     for jumped in found[4:7]:
         assert not jumped.measurement.accepted
+        assert jumped.measurement.sighting is None
         (jump,) = re.findall(r"jumps to ([\d.]+) deg", jumped.measurement.reason)
         assert float(jump) == pytest.approx(110.0, abs=0.2)
         assert jumped.measurement.angle_deg is None
