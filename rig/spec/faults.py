@@ -229,14 +229,18 @@ class Expectation(SpecModel):
         "vented", description="half a minute after the end"
     )
     wrong_points: bool = Field(
-        False, description="points taken under the fault may be wrong, unseen by rig"
+        False, description="points taken before the fault is found may be wrong; never of a success"
     )
 
     @model_validator(mode="after")
-    def _codes_have_bounds(self) -> Expectation:
+    def _reactions_are_told(self) -> Expectation:
         require(
             bool(self.codes) == (self.within is not None),
             "expected 'codes' and 'within' together: every fault code is raised within a bound",
+        )
+        require(
+            not (self.wrong_points and self.run == "success"),
+            "expected no 'wrong_points' of a run that succeeds: nobody would be told",
         )
         return self
 

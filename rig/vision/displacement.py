@@ -12,9 +12,9 @@ import cv2
 import numpy as np
 
 from rig.spec.calibration import CameraCalibration, RulerCalibration
-from rig.vision.errors import UntrustedFrameError, VisionError
+from rig.vision.errors import UntrustedFrameError
 from rig.vision.lines import FloatArray
-from rig.vision.motion import ConstantVelocity
+from rig.vision.motion import ConstantVelocity, require_later
 from rig.vision.plane import PicturePlane, rectify, require_picture
 from rig.vision.ruler import find_ruler
 from rig.vision.segment import Image, pyramid
@@ -71,11 +71,8 @@ class DisplacementTracker:
         Raises VisionError for times that do not, and for what is no picture of the camera.
         """
         require_picture(image_bgr, self._camera)
-        if self._track is not None and time_s <= self._track.time_s:
-            raise VisionError(
-                f"A frame at {time_s:g} s follows one at {self._track.time_s:g} s; expected "
-                "frames of one film in the order in which they were taken."
-            )
+        if self._track is not None:
+            require_later(time_s, self._track.time_s)
         try:
             return self._measured(image_bgr, time_s)
         except UntrustedFrameError as why:

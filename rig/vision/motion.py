@@ -11,7 +11,17 @@ import numpy as np
 from filterpy.common import Q_discrete_white_noise
 from filterpy.kalman import KalmanFilter
 
+from rig.vision.errors import VisionError
 from rig.vision.lines import FloatArray
+
+
+def require_later(time_s: float, before_s: float) -> None:
+    """Raises VisionError where a film's frame does not come after the one before."""
+    if time_s <= before_s:
+        raise VisionError(
+            f"A frame at {time_s:g} s follows one at {before_s:g} s; expected frames of one film "
+            "in the order in which they were taken."
+        )
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.vision.errors import VisionError
 from rig.vision.lines import FloatArray
 from rig.vision.measure import AngleMeasurement, AngleMeter
-from rig.vision.motion import ConstantVelocity
+from rig.vision.motion import ConstantVelocity, require_later
 from rig.vision.plane import PicturePlane
 from rig.vision.segment import Image
 
@@ -71,11 +70,8 @@ class AngleTracker:
         Raises VisionError for times that do not, and for what `AngleMeter.measure` refuses.
         """
         track = self._track
-        if track is not None and time_s <= track.time_s:
-            raise VisionError(
-                f"A frame at {time_s:g} s follows one at {track.time_s:g} s; expected frames of "
-                "one film in the order in which they were taken."
-            )
+        if track is not None:
+            require_later(time_s, track.time_s)
         if track is not None and time_s - track.seen_s > self._lost_after_s:
             track = None
         if track is None:

@@ -14,7 +14,7 @@ from rig.campaign.campaign import Campaign
 from rig.campaign.judge import Verdict, judge
 from rig.campaign.scenario import Outcome
 from rig.campaign.table import write_tables
-from rig.spec.faults import FaultScript
+from rig.spec.faults import Expectation, FaultScript
 from rig.spec.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -135,3 +135,8 @@ def test_the_table_holds_what_was_judged(judged: Judged, tmp_path: Path) -> None
     assert scenario["code"] == "sensor_open"
     assert float(line["valve_open_after_s"]) <= float(line["bound_s"]) == 0.016
     assert scenario["points"] == len(verdict.outcome.points) == 2
+
+
+def test_no_script_may_expect_wrong_points_of_a_run_that_succeeds() -> None:
+    with pytest.raises(ValueError, match="nobody would be told"):
+        Expectation.model_validate({"run": "success", "wrong_points": True})
