@@ -25,9 +25,12 @@ Command = Callable[..., Outcome]
 
 @pytest.fixture
 def rig(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Command:
-    """`rig("check", file)` as in a shell that stands in the root of the checkout."""
+    """`rig("check", file)` as in a shell that stands in the root of the checkout.
+
+    So wide that nothing wraps: where a sentence breaks would hang on how long a test's folder is.
+    """
     monkeypatch.chdir(ROOT)
-    monkeypatch.setenv("COLUMNS", "120")
+    monkeypatch.setenv("COLUMNS", "2000")
 
     def run(*arguments: str | Path) -> Outcome:
         capfd.readouterr()
