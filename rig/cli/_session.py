@@ -36,6 +36,7 @@ from rig.mechanics.profile import cavity_volume
 from rig.record.reader import RunReader
 from rig.record.writer import require_free_folder
 from rig.spec.faults import FaultScript
+from rig.spec.free_path import first_free
 from rig.spec.loading import read
 from rig.spec.workspace import Setup, Workspace
 
@@ -91,7 +92,9 @@ class Session:
 
     def run(self, out: Path | None) -> int:
         """Take the whole run; returns the exit code of the command."""
-        folder = out or self._free_folder()
+        setup = self.request.setup
+        stem = f"{setup.actuator.name}-{setup.bench.name}-seed{self.request.seed}"
+        folder = out or first_free(self.logs / stem)
         require_free_folder(folder)
         bench = self._open(folder, segment=0, start_s=0.0, faults=self.faults)
         return self._take(
@@ -181,12 +184,6 @@ class Session:
             markup=False,
         )
         return outcome.error.exit_code
-
-    def _free_folder(self) -> Path:
-        setup = self.request.setup
-        stem = f"{setup.actuator.name}-{setup.bench.name}-seed{self.request.seed}"
-        candidates = (self.logs / (stem if n == 1 else f"{stem}-{n}") for n in range(1, 100_000))
-        return next(folder for folder in candidates if not folder.exists())
 
 
 def new_session(

@@ -10,6 +10,7 @@ from ruamel.yaml import YAML
 
 from rig.spec.calibration import Calibration
 from rig.spec.errors import Problem, SpecError
+from rig.spec.free_path import first_free
 from rig.spec.loading import AnyCalibration, parse_calibration
 
 HEADER = "# yaml-language-server: $schema=../models/schemas/calibration.json\n"
@@ -35,8 +36,7 @@ def free_path(folder: Path, calibration: Calibration, instrument: str) -> Path:
     provenance = calibration.provenance
     serial = "".join(c if c.isalnum() else "-" for c in provenance.serial_number).strip("-")
     stem = "-".join(part for part in (instrument, serial, str(provenance.date)) if part)
-    candidates = (folder / f"{stem}{'' if n == 1 else f'-{n}'}.yaml" for n in range(1, 10_000))
-    return next(path for path in candidates if not path.exists())
+    return first_free(folder / stem, ".yaml")
 
 
 def write_calibration(calibration: AnyCalibration, path: Path) -> None:
