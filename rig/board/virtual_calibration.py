@@ -95,8 +95,9 @@ class VirtualCalibrationBench:
         self.board = board_on(bench, self.plant)
         self.bus = SlcanBus(self.board)
 
-    def mount(self, fixture: Literal["free", "blocked", "plugged"]) -> None:
+    def mount(self, fixture: Literal["free", "blocked", "plugged"], idle: Idle) -> None:
         """Arrange the bench."""
+        del idle
         self.plant.set_fixture(Fixture[fixture.upper()])
 
     def close(self) -> None:

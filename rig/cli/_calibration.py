@@ -16,13 +16,19 @@ from rich.markup import escape
 
 from rig.board.real import INSTRUCTIONS
 from rig.board.virtual_calibration import CELSIUS, VirtualCalibrationBench
+from rig.calibrate.errors import CalibrateError
 from rig.calibrate.points import Row, read_points
 from rig.cli._calibration_file import finish, folder, provenance
 from rig.cli._interruption import catching_signals
 from rig.errors import RigError
 from rig.experiment.bench import Fixture
-from rig.experiment.calibration.procedures import Stage
-from rig.experiment.calibration.references import CalibrationBench, Idle, Standard, Taken
+from rig.experiment.calibration.references import (
+    CalibrationBench,
+    Idle,
+    Stage,
+    Standard,
+    Taken,
+)
 from rig.experiment.calibration.session import calibrate_on
 from rig.experiment.errors import AbortedError
 from rig.experiment.prepare import bench_parameters, require_board_takes
@@ -30,6 +36,7 @@ from rig.link.client import RigLink
 from rig.link.open import open_bus
 from rig.spec.bench import BenchSpec, SerialBoard, VirtualReferences
 from rig.spec.calibration import Environment, Provenance
+from rig.spec.free_path import first_free
 from rig.spec.loading import AnyCalibration
 from rig.spec.workspace import BenchCalibrations, Workspace
 
@@ -97,18 +104,19 @@ class Task:
 
     def _take(self, procedure: Procedure, columns: Sequence[str]) -> list[Row]:
         parameters, rows = self.parameters, list[Row]()
-        kept = folder(self.workspace) / "points" / f"{self.instrument}-{date.today()}.csv"
-        kept = _free(kept)
+        kept = folder(self.workspace) / "points" / f"{self.instrument}-{date.today()}"
+        kept = first_free(kept, ".csv")
 
         def taken(row: Row) -> None:
-            rows.append(row)
             _append(kept, row, columns)
+            rows.append(row)
             numbers = ", ".join(f"{name} {float(row[name]):.6g}" for name in columns)
             self.console.print(f"  {row['kind']}: {numbers}", highlight=False)
 
         def stage(text: str) -> None:
             self.console.print(escape(text), style="bold")
 
+        _make_folder(kept.parent)
         bench = self._open()
         try:
             with catching_signals() as interruption:
@@ -116,13 +124,14 @@ class Task:
                     bench,
                     parameters,
                     lambda link: procedure(bench, link, taken, stage),
+                    stage,
                     interruption.check,
                 )
         except RigError:
             if rows:
                 self.console.print(
-                    f"The bench was vented. {len(rows)} points are kept in {kept}: "
-                    f"`rig calibrate {self.instrument} --points {kept}` fits what there is.",
+                    f"{len(rows)} points are kept in {kept}: `rig calibrate {self.instrument} "
+                    f"--bench {self.order.bench} --points {kept}` fits what there is.",
                     soft_wrap=True,
                     markup=False,
                 )
@@ -189,11 +198,10 @@ class RealCalibrationBench:
     def __init__(self, board: SerialBoard, console: Console) -> None:
         self.bus = open_bus(board.port, board.baudrate)
         self.references = TerminalReferences(console)
-        self._console = console
 
-    def mount(self, fixture: Fixture) -> None:
+    def mount(self, fixture: Fixture, idle: Idle) -> None:
         """Ask the person to arrange it; nothing is under pressure then."""
-        self._console.input(f"{INSTRUCTIONS[fixture]}, then press Enter. ")
+        self.references.answer(f"{INSTRUCTIONS[fixture]}, then press Enter. ", idle)
 
     def close(self) -> None:
         """Release the port."""
@@ -219,11 +227,11 @@ class TerminalReferences:
     def place(self, mass_g: float, idle: Idle) -> None:
         """Ask for a mass."""
         what = f"Place {mass_g:g} g on" if mass_g else "Take everything off"
-        self._answer(f"{what} the load cell, then press Enter. ", idle)
+        self.answer(f"{what} the load cell, then press Enter. ", idle)
 
     def fill(self, idle: Idle) -> None:
         """Ask for water."""
-        self._answer(
+        self.answer(
             "Fill syringe and tube with water without bubbles, put the end of the tube over an "
             "empty vessel on the balance, tare the balance, then press Enter. ",
             idle,
@@ -235,13 +243,13 @@ class TerminalReferences:
 
     def _number(self, question: str, idle: Idle) -> float:
         while True:
-            text = self._answer(question, idle).strip().replace(",", ".")
+            text = self.answer(question, idle).strip().replace(",", ".")
             try:
                 return float(text)
             except ValueError:
                 self._console.print(f"'{escape(text)}' is no number; expected one such as 9.998.")
 
-    def _answer(self, question: str, idle: Idle) -> str:
+    def answer(self, question: str, idle: Idle) -> str:
         """A line from the terminal; a thread waits for it while `idle` keeps the board calm."""
         answers: list[str | BaseException] = []
 
@@ -262,20 +270,29 @@ class TerminalReferences:
         return answer
 
 
-def _free(path: Path) -> Path:
-    others = (path.with_stem(f"{path.stem}-{n}") for n in range(2, 10_000))
-    return next(p for p in (path, *others) if not p.exists())
-
-
 def _append(path: Path, row: Row, columns: Sequence[str]) -> None:
-    """One point, on disk as soon as it is taken."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    """One point, on disk as soon as it is taken; raises CalibrateError if the disk refuses."""
     fresh = not path.exists()
-    with path.open("a", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        if fresh:
-            writer.writerow(("kind", *columns))
-        writer.writerow((row["kind"], *(row[name] for name in columns)))
+    try:
+        with path.open("a", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file)
+            if fresh:
+                writer.writerow(("kind", *columns))
+            writer.writerow((row["kind"], *(row[name] for name in columns)))
+    except OSError as error:
+        raise CalibrateError(
+            f"{path}: a point cannot be written: {error.strerror}. Mend that, then calibrate again."
+        ) from None
+
+
+def _make_folder(folder: Path) -> None:
+    """For the points, before anything moves; raises CalibrateError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CalibrateError(
+            f"{folder}: points cannot be kept there: {error.strerror}. Nothing was moved."
+        ) from None
 
 
 def numbers(text: str, what: str) -> tuple[float, ...]:

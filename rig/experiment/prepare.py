@@ -208,8 +208,10 @@ def vented_pressure_kpa(link: RigLink) -> float:
 def make_safe(link: RigLink) -> str:
     """Vent whatever happened before; returns a sentence about how that went.
 
-    Used on the way out of a failed run, so it reports instead of raising.
+    Used on the way out of a failed run, so it reports instead of raising; a person who will not
+    wait for it is told what happens then.
     """
+    link.ignore_interruptions()
     link.raise_faults(False)
     link.expect_state(None)
     try:
@@ -218,6 +220,8 @@ def make_safe(link: RigLink) -> str:
         vent(link)
     except LinkError as error:
         return f"The bench could not be vented from here ({error}) Vent it by hand."
+    except KeyboardInterrupt:
+        return "Venting was interrupted; the board's own watchdog vents when it hears nothing."
     return "The bench was vented and the plunger is home."
 
 

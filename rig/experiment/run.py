@@ -182,7 +182,8 @@ def _recorded(context: RunContext, record: RunWriter, done: Collection[PointKey]
         # the log may be what broke (a full disk): venting must not depend on it
         recorder.drop_what_cannot_be_written()
     try:
-        ending = _make_safe(context)
+        context.observer.stage("making the bench safe")
+        ending = make_safe(link)
         recorder.flush()
         record.event(link.now_s, "made safe", {"result": ending})
         lost = {"frames_lost": link.frames_lost}
@@ -192,16 +193,6 @@ def _recorded(context: RunContext, record: RunWriter, done: Collection[PointKey]
         if crash is not None:
             raise crash
     return RunOutcome(stop, error)
-
-
-def _make_safe(context: RunContext) -> str:
-    """Vent, and say how that went; even a person who will not wait leaves a finished log."""
-    context.link.ignore_interruptions()
-    context.observer.stage("making the bench safe")
-    try:
-        return make_safe(context.link)
-    except KeyboardInterrupt:
-        return "Venting was interrupted; the board's own watchdog vents when it hears nothing."
 
 
 def _experiments(

@@ -9,8 +9,10 @@ from typing import Any
 
 import pytest
 
-from rig.cli._calibration import TerminalReferences
+from rig.cli._calibration import RealCalibrationBench, TerminalReferences
 from rig.experiment.errors import AbortedError
+from rig.link.bus import SlcanBus
+from rig.spec.bench import SerialBoard
 from rig.spec.calibration import TransducerCalibration
 from rig.spec.loading import load_calibration
 from tests.benches import BEAM_ACTUATOR
@@ -98,6 +100,55 @@ def test_an_interrupted_calibration_keeps_its_points(
     assert len(kept.read_text().splitlines()) == 1 + 3  # header, zero, 2.82 and 5.64 kPa
     assert str(kept) in outcome.out.replace("\n", "")
     assert list((lab / "calibration").glob("transducer-2*.yaml")) == []
+    assert "The bench was vented" in outcome.out
+    assert f"rig calibrate pressure --bench virtual-beam --points {kept}" in outcome.out
+
+
+def unwrapped(text: str) -> str:
+    return " ".join(text.split())
+
+
+def test_a_bench_that_could_not_be_vented_is_not_said_to_be(
+    rig: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    poll = SlcanBus.poll
+
+    def cut(self: Any, about_kpa: float, idle: Any) -> float:
+        if about_kpa > 6:
+            monkeypatch.setattr(SlcanBus, "poll", lambda *which: poll(*which)[:0])
+        return about_kpa
+
+    monkeypatch.setattr("rig.board.virtual_calibration.VirtualReferenceSet.gauge_kpa", cut)
+    outcome = rig("calibrate", "pressure", "--bench", "virtual-beam", "--steps", "5")
+    assert outcome.code != 0
+    assert "could not be vented from here" in outcome.out
+    assert "was vented" not in outcome.out
+
+
+def test_points_that_cannot_be_kept_are_no_defect_and_nothing_moves_for_them(
+    rig: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "calibration").mkdir()
+    (tmp_path / "calibration" / "points").write_text("in the way")
+    outcome = rig("calibrate", "loadcell", "--bench", "virtual-beam")
+    assert outcome.code == 1
+    assert "points cannot be kept there: File exists. Nothing was moved." in unwrapped(outcome.err)
+    assert "taring" not in outcome.out
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full here")
+def test_a_full_disk_ends_a_calibration_with_the_bench_vented(
+    rig: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("rig.cli._calibration.first_free", lambda *_: Path("/dev/full"))
+    outcome = rig("calibrate", "loadcell", "--bench", "virtual-beam")
+    assert outcome.code == 1
+    assert "/dev/full: a point cannot be written: No space left" in unwrapped(outcome.err)
+    assert "The bench was vented" in outcome.out
+    assert "points are kept" not in outcome.out
 
 
 class Typist:
@@ -132,6 +183,17 @@ def test_input_that_ends_stops_the_calibration() -> None:
     typist = Typist()
     with pytest.raises(AbortedError):
         TerminalReferences(typist).place(20.0, typist.woken.set)  # type: ignore[arg-type]
+
+
+def test_a_person_who_arranges_the_bench_keeps_the_board_alive_and_may_leave(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("rig.cli._calibration.open_bus", lambda *_: None)
+    typist = Typist("")
+    bench = RealCalibrationBench(SerialBoard(kind="serial", port="none"), typist)  # type: ignore[arg-type]
+    bench.mount("plugged", typist.woken.set)
+    with pytest.raises(AbortedError):
+        bench.mount("free", typist.woken.set)
 
 
 @pytest.mark.parametrize("verb", ["pressure", "loadcell", "syringe"])

@@ -118,7 +118,7 @@ def _measured_pressure(seed: int) -> tuple[Estimate, float]:
     """A pressure in kPa on a bench with its tube plugged, and the mean true one meanwhile."""
     target_kpa = float(np.random.default_rng((seed, 1)).uniform(0.5, 14.0))
     bench, link = opened(seed)
-    bench.mount("plugged")
+    bench.mount("plugged", link.receive)
     make_ready(link)
     link.wait(OLD_ZERO_S)
     leave_home(link)

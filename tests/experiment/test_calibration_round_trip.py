@@ -17,6 +17,7 @@ from rig.calibrate.load_cell import fit_load_cell
 from rig.calibrate.points import Row
 from rig.calibrate.syringe import Surroundings, fit_syringe
 from rig.calibrate.transducer import fit_transducer
+from rig.experiment import prepare
 from rig.experiment.calibration.procedures import (
     LoadCellPlan,
     PressurePlan,
@@ -29,6 +30,7 @@ from rig.experiment.calibration.procedures import (
 from rig.experiment.calibration.session import calibrate_on
 from rig.experiment.errors import AbortedError
 from rig.experiment.prepare import bench_parameters
+from rig.link.client import RigLink
 from rig.plant.instruments import Instruments
 from rig.spec.calibration import (
     LoadCellCalibration,
@@ -58,7 +60,10 @@ def calibrated_transducer(seed: int, steps: int = 10) -> tuple[Instruments, Tran
     bench, rows = VirtualCalibrationBench(BENCH, seed), list[Row]()
     plan = PressurePlan(tuple(np.linspace(14 / steps, 14, steps).tolist()))
     calibrate_on(
-        bench, PARAMETERS, lambda link: pressure_points(bench, link, plan, rows.append, silent)
+        bench,
+        PARAMETERS,
+        lambda link: pressure_points(bench, link, plan, rows.append, silent),
+        silent,
     )
     made = fit_transducer(rows).calibration(rows, REFERENCES.gauge_u, PROVENANCE)
     return bench.instruments, made
@@ -80,7 +85,10 @@ def calibrated_cell(seed: int) -> tuple[Instruments, LoadCellCalibration]:
     bench, rows = VirtualCalibrationBench(BENCH, seed), list[Row]()
     plan = LoadCellPlan((20.0, 50.0, 100.0, 150.0, 200.0), creep_s=120.0)
     calibrate_on(
-        bench, PARAMETERS, lambda link: load_cell_points(bench, link, plan, rows.append, silent)
+        bench,
+        PARAMETERS,
+        lambda link: load_cell_points(bench, link, plan, rows.append, silent),
+        silent,
     )
     return bench.instruments, fit_load_cell(rows).calibration(rows, REFERENCES.mass_u, PROVENANCE)
 
@@ -107,7 +115,10 @@ def calibrated_syringe(seed: int) -> tuple[Instruments, SyringeCalibration]:
     bench, rows = VirtualCalibrationBench(BENCH, seed), list[Row]()
     plan = SyringePlan(jogs=5, weighings=5, top_kpa=14.0)
     calibrate_on(
-        bench, PARAMETERS, lambda link: syringe_points(bench, link, plan, rows.append, silent)
+        bench,
+        PARAMETERS,
+        lambda link: syringe_points(bench, link, plan, rows.append, silent),
+        silent,
     )
     around = Surroundings(
         ambient_kpa=BENCH.ambient.pressure / 1e3,
@@ -191,7 +202,7 @@ def test_the_reference_gauge_has_an_error_of_its_own() -> None:
     readings = []
     for seed in range(20):
         bench = VirtualCalibrationBench(BENCH, seed)
-        bench.mount("plugged")
+        bench.mount("plugged", lambda: None)
         bench.plant.run(2_000, steps=8)
         bench.plant.run(3_000)
         truth = bench.plant.truth().gauge_pressure / 1e3
@@ -212,11 +223,27 @@ def test_a_calibration_that_is_stopped_leaves_the_bench_vented_and_its_points() 
             bench,
             PARAMETERS,
             lambda link: pressure_points(bench, link, plan, rows.append, silent),
+            silent,
             stop,
         )
     assert [row["kind"] for row in rows] == ["zero", "up", "up"]
     assert abs(bench.plant.truth().gauge_pressure) < 50.0
     assert bench.plant.truth().valve_open
+
+
+def test_a_person_who_does_not_wait_for_the_venting_is_told_who_vents(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def insist(_: RigLink) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(prepare, "vent", insist)
+    told: list[str] = []
+    bench = VirtualCalibrationBench(BENCH, 1)
+    calibrate_on(bench, PARAMETERS, lambda link: None, told.append)
+    assert told == [
+        "Venting was interrupted; the board's own watchdog vents when it hears nothing."
+    ]
 
 
 def test_every_sweep_goes_there_and_back() -> None:

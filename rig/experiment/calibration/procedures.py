@@ -6,13 +6,13 @@ steeper nor flatter than it is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from rig.calibrate.points import Row
-from rig.experiment.calibration.references import CalibrationBench, Taken
+from rig.experiment.calibration.references import CalibrationBench, Stage, Taken
 from rig.experiment.errors import ExperimentError
 from rig.experiment.prepare import leave_home, make_ready, tare, vent
 from rig.experiment.sweep import cell_readings, go_to, settle
@@ -31,9 +31,6 @@ COMPRESSION_KPA = 2.5
 """More than what a jog at that flow, 1 mL, adds to the pressure in a syringe of 60 mL."""
 JOG_S = 1.0
 """A jog ends by itself after half a second; the rest is for the water to come to rest."""
-
-Stage = Callable[[str], None]
-"""Told what the bench is about to do."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +63,7 @@ def pressure_points(
     bench: CalibrationBench, link: RigLink, plan: PressurePlan, taken: Taken, stage: Stage
 ) -> None:
     """Transducer beside a gauge on the plugged tube; the plunger makes the pressure."""
-    bench.mount("plugged")
+    bench.mount("plugged", link.receive)
     stage("homing the plunger and zeroing the transducer")
     make_ready(link)
     _vented(link, taken)
@@ -97,7 +94,7 @@ def load_cell_points(
 ) -> None:
     """Load cell under masses, and its creep under the heaviest."""
     references = bench.references
-    bench.mount("free")
+    bench.mount("free", link.receive)
     references.place(0.0, link.receive)
     stage("taring")
     tare(link)
@@ -140,7 +137,7 @@ def syringe_points(
         )
     stage("emptying: the plunger goes home")
     vent(link)
-    bench.mount("plugged")
+    bench.mount("plugged", link.receive)
     make_ready(link)
     leave_home(link)
     stage("compressing gas behind the plug")

@@ -14,6 +14,8 @@ Idle = Callable[[], object]
 """To be called again and again while a person is waited for: it keeps the board's watchdog calm."""
 Taken = Callable[[Row], None]
 """Told of every point as soon as it is taken."""
+Stage = Callable[[str], None]
+"""Told what the bench is about to do, and at the end whether it is safe."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +63,11 @@ class CalibrationBench(Protocol):
         """What is beside the bench."""
         ...
 
-    def mount(self, fixture: Fixture) -> None:
-        """Plug the tube, or free the load cell; on a real bench, ask a person to."""
+    def mount(self, fixture: Fixture, idle: Idle) -> None:
+        """Plug the tube, or free the load cell; on a real bench, ask a person to.
+
+        Returns when that is done; meanwhile it calls `idle`.
+        """
         ...
 
     def close(self) -> None:

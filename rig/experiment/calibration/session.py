@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from rig.experiment.calibration.references import CalibrationBench
+from rig.experiment.calibration.references import CalibrationBench, Stage
 from rig.experiment.prepare import make_safe, take_over, write_parameters
 from rig.link.client import RigLink
 
@@ -15,12 +15,13 @@ def calibrate_on(
     bench: CalibrationBench,
     parameters: Mapping[str, float],
     procedure: Procedure,
+    stage: Stage,
     interrupted: Callable[[], None] | None = None,
 ) -> None:
     """Do `procedure` on a bench whose board has `parameters`; the bench is vented in any case.
 
-    `interrupted` is asked while waiting and may raise to stop; what the procedure told of its
-    points until then stays told.
+    `stage` is told how the venting went. `interrupted` is asked while waiting and may raise to
+    stop; what the procedure told of its points until then stays told.
     """
     link = RigLink(bench.bus, interrupted=interrupted)
     link.open()
@@ -29,5 +30,4 @@ def calibrate_on(
     try:
         procedure(link)
     finally:
-        link.ignore_interruptions()
-        make_safe(link)
+        stage(make_safe(link))
