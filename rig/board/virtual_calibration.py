@@ -12,16 +12,15 @@ from typing import Literal
 import numpy as np
 
 from rig.board.virtual import Seeds, board_on, virtual_part
-from rig.calibrate.load_cell import BUOYANCY
+from rig.calibrate.air import AIR_KG_M3, BUOYANCY, MASSES_KG_M3
 from rig.calibrate.syringe import water_density
 from rig.link.bus import SlcanBus
 from rig.plant.instruments import Instruments
 from rig.plant.plant import Fixture, Plant, plant_parameters
 from rig.plant.truth_tables import TruthTables
 from rig.spec.bench import BenchSpec, VirtualReferences
-from rig.spec.quantity import STANDARD_GRAVITY
+from rig.spec.quantity import CELSIUS, STANDARD_GRAVITY
 
-CELSIUS = 273.15
 Idle = Callable[[], object]
 _PRESSURES = np.array([-2e3, 20e3])
 _CAVITY = 10e-6  # m3 behind the plug, which nobody sees
@@ -39,12 +38,12 @@ class VirtualReferenceSet:
     ) -> None:
         self._plant = plant
         self._spec = references
-        self._density = water_density(temperature_c)
+        self._density = water_density(temperature_c) * 1e3
         gauge, mass, balance = rng.normal(size=3)
         self._gauge = 1 + references.gauge_u * gauge
         self._mass = 1 + references.mass_u * mass
         self._balance = 1 + references.balance_u * balance
-        self._filled_ml = 0.0
+        self._filled = 0.0
 
     def gauge_kpa(self, about_kpa: float, idle: Idle) -> float:
         """The gauge's display."""
@@ -61,14 +60,16 @@ class VirtualReferenceSet:
     def fill(self, idle: Idle) -> None:
         """The balance counts from here."""
         del idle
-        self._filled_ml = self._plant.truth().pushed_volume * 1e6
+        self._filled = self._plant.truth().pushed_volume
 
     def water_g(self, idle: Idle) -> float:
-        """The balance's display."""
+        """The balance's display: adjusted in air, by masses, it weighs water that air bears."""
         del idle
-        pushed_ml = self._plant.truth().pushed_volume * 1e6 - self._filled_ml
-        shown = pushed_ml * self._density * self._balance
-        return _displayed(shown / 1e3, self._spec.balance_resolution) * 1e3
+        pushed = self._plant.truth().pushed_volume - self._filled
+        load = pushed * (self._density - AIR_KG_M3) * STANDARD_GRAVITY
+        per_kg = (MASSES_KG_M3 - AIR_KG_M3) / MASSES_KG_M3 * STANDARD_GRAVITY
+        shown = load / per_kg * self._balance
+        return _displayed(shown, self._spec.balance_resolution) * 1e3
 
 
 def _displayed(value: float, resolution: float) -> float:

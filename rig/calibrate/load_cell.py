@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.calibrate.air import BUOYANCY
 from rig.calibrate.curve import Curve, fit_curve
 from rig.calibrate.errors import CalibrateError
 from rig.calibrate.points import Row, above_zero, column, of_kind
@@ -22,8 +23,6 @@ Array = NDArray[np.float64]
 COLUMNS = ("mass_g", "counts", "time_s")
 """`kind` is zero (nothing on it), up, down, or creep (time since the mass was placed)."""
 MODEL = "force = offset + slope n + curvature n^2; grams-force, n in counts above zero"
-BUOYANCY = 1.2 / 8000
-"""Density of air over the conventional density of masses (OIML D 28)."""
 
 
 def grams_force(mass_g: Array, gravity: float = STANDARD_GRAVITY) -> Array:

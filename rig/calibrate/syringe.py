@@ -1,6 +1,11 @@
 """The plunger's drive by weighing water, its dead volume and backlash by Boyle's law.
 
-Steps that push water out are compared with what it weighs. With the tube plugged the gas obeys
+Steps that push water out are compared with what it weighs. Air bears water of the density rho, and
+the masses that the balance was adjusted with, so a balance that shows w has on it (OIML D 28)
+
+    m = w (1 - air / 8000) / (1 - air / rho).
+
+With the tube plugged the gas obeys
 p V = const (isothermal, after a rest): with the volume V enclosed at ambient pressure a, when the
 plunger stands at `start`, it stands at gauge pressure p at
 
@@ -18,10 +23,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.calibrate.air import AIR_KG_M3, BUOYANCY
 from rig.calibrate.errors import CalibrateError
 from rig.calibrate.least_squares import LinearFit, least_squares
 from rig.calibrate.points import Row, column, of_kind
-from rig.spec.calibration import Evidence, Provenance, SyringeCalibration
+from rig.spec.calibration import (
+    Evidence,
+    Provenance,
+    SyringeCalibration,
+    TransducerCalibration,
+)
 
 Array = NDArray[np.float64]
 COLUMNS = ("plunger_ml", "pressure_kpa", "water_g")
@@ -34,12 +45,21 @@ def water_density(temperature_c: float) -> float:
     return 0.999974950 * (1 - (t - 3.983035) ** 2 * (t + 301.797) / (522528.9 * (t + 69.34881)))
 
 
+def shown_density(temperature_c: float) -> float:
+    """What a balance in air shows of a millilitre of water, in grams."""
+    return (water_density(temperature_c) - AIR_KG_M3 / 1e3) / (1 - BUOYANCY)
+
+
 @dataclass(frozen=True)
 class Surroundings:
     """What the evaluation needs to know besides the points."""
 
     ambient_kpa: float
+    ambient_u_kpa: float
+    """Standard uncertainty of the ambient pressure, as all below that end in `_u`."""
     temperature_c: float
+    """Of the water."""
+    temperature_u_c: float
     volume_per_step_ul: float
     """What the board took for one step while the points were taken."""
     syringe_ml: float
@@ -47,10 +67,8 @@ class Surroundings:
     tube_u_ml: float
     balance_u: float
     """Relative standard uncertainty of the balance's scale."""
-    pressure_u: float
-    """Relative standard uncertainty of the transducer's gain."""
-    zero_u_kpa: float
-    """Standard uncertainty of its zero, which may drift between pushing and pulling."""
+    transducer: TransducerCalibration
+    """What read the pressures; its zero may drift between pushing and pulling."""
 
 
 @dataclass(frozen=True)
@@ -64,13 +82,15 @@ class SyringeFit:
     @property
     def scale(self) -> float:
         """Volume really pushed over volume counted."""
-        return self.dispensed["slope"] / water_density(self.around.temperature_c)
+        return self.dispensed["slope"] / shown_density(self.around.temperature_c)
 
     @property
     def scale_u(self) -> float:
         """Relative standard uncertainty of `scale`."""
         fitted = self.dispensed.u({"slope": 1.0}) / self.dispensed["slope"]
-        return float(np.hypot(fitted, self.around.balance_u))
+        t, u = self.around.temperature_c, self.around.temperature_u_c
+        warmth = (water_density(t - u) - water_density(t + u)) / 2 / water_density(t)
+        return float(np.linalg.norm([fitted, self.around.balance_u, warmth]))
 
     @property
     def dead_ml(self) -> float:
@@ -81,18 +101,21 @@ class SyringeFit:
 
     @property
     def dead_u_ml(self) -> float:
-        """Standard uncertainty of `dead_ml`: fit, scales of volume and pressure, tube, zero.
+        """Standard uncertainty of `dead_ml`: fit, scales, ambient pressure, tube, bow and zero.
 
-        x = V p / (a + p): a relative error e of p makes one of e a / (a + p), nearly e, in V.
+        x = V p / (a + p): a relative error e of p makes one of e a / (a + p), nearly e, in V; so
+        does one of a.
         """
-        enclosed = self.scale * self.compressed["volume"]
+        enclosed, around = self.scale * self.compressed["volume"], self.around
         return float(
             np.linalg.norm(
                 [
                     self.scale * self.compressed.u({"volume": 1.0, "start": 1.0, "backlash": -1.0}),
                     self.scale_u * enclosed,
-                    self.around.pressure_u * enclosed,
-                    self.around.tube_u_ml,
+                    around.transducer.gain_u * enclosed,
+                    around.ambient_u_kpa / around.ambient_kpa * enclosed,
+                    around.tube_u_ml,
+                    self._position_u_ml(around.transducer.linearity_u),
                     self.zero_u_ml,
                 ]
             )
@@ -101,12 +124,12 @@ class SyringeFit:
     @property
     def zero_u_ml(self) -> float:
         """What a drift of the zero moves the plunger's position by at a given reading."""
-        return (
-            self.scale
-            * self.compressed["volume"]
-            / self.around.ambient_kpa
-            * (self.around.zero_u_kpa)
-        )
+        return self._position_u_ml(self.around.transducer.zero_u)
+
+    def _position_u_ml(self, pressure_u: float) -> float:
+        """What an error of a reading in Pa makes of the plunger's position."""
+        enclosed = self.scale * self.compressed["volume"]
+        return enclosed / self.around.ambient_kpa * pressure_u / 1e3
 
     @property
     def backlash_u_ml(self) -> float:
@@ -148,7 +171,13 @@ class SyringeFit:
                         "x = start + volume p / (a + p) - backlash [down]; mL as counted"
                     ),
                 ),
-                findings={"scale": self.scale, "ambient_kpa": self.around.ambient_kpa},
+                findings={
+                    "scale": self.scale,
+                    "ambient_kpa": self.around.ambient_kpa,
+                    "ambient_u_kpa": self.around.ambient_u_kpa,
+                    "water_c": self.around.temperature_c,
+                    "water_u_c": self.around.temperature_u_c,
+                },
             ),
         )
 
@@ -160,7 +189,9 @@ def fit_syringe(rows: Sequence[Row], around: Surroundings) -> SyringeFit:
     dispensed = least_squares(
         {"offset": np.ones_like(counted), "slope": counted}, column(poured, "water_g")
     )
-    pressure = column(pressed, "pressure_kpa")
+    pressure = np.array(
+        [around.transducer.corrected(1e3 * p) / 1e3 for p in column(pressed, "pressure_kpa")]
+    )
     down = np.array([row["kind"] == "down" for row in pressed], dtype=np.float64)
     compressed = least_squares(
         {

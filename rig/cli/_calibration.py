@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from rig.board.real import INSTRUCTIONS
-from rig.board.virtual_calibration import CELSIUS, VirtualCalibrationBench
+from rig.board.virtual_calibration import VirtualCalibrationBench
 from rig.calibrate.errors import CalibrateError
 from rig.calibrate.points import Row, read_points
 from rig.cli._calibration_file import finish, folder, provenance
@@ -38,6 +38,7 @@ from rig.spec.bench import BenchSpec, SerialBoard, VirtualReferences
 from rig.spec.calibration import Environment, Provenance
 from rig.spec.free_path import first_free
 from rig.spec.loading import AnyCalibration
+from rig.spec.quantity import CELSIUS
 from rig.spec.workspace import BenchCalibrations, Workspace
 
 T = TypeVar("T")
@@ -74,8 +75,8 @@ class Task:
 
     @property
     def simulated(self) -> bool:
-        """Whether a simulated bench is calibrated; points from a file are real ones."""
-        return self.bench.simulated and self.order.points is None
+        """Whether a simulated bench is calibrated; its points stay simulated in a file, too."""
+        return self.bench.simulated
 
     @property
     def temperature_c(self) -> float:
@@ -145,9 +146,15 @@ class Task:
             return RealCalibrationBench(self.bench.board, self.console)
         return VirtualCalibrationBench(self.bench, self.order.seed)
 
-    def provenance(self, method: str, instrument: str) -> Provenance:
-        """Who calibrated what, when and against what; counts from today."""
-        ambient = self.bench.ambient.pressure if self.order.points is None else None
+    def provenance(
+        self, method: str, instrument: str, ambient_kpa: float | None = None
+    ) -> Provenance:
+        """Who calibrated what, when and against what; counts from today.
+
+        `ambient_kpa` is what was measured; else only that of a simulated bench is known.
+        """
+        if ambient_kpa is None and self.simulated:
+            ambient_kpa = self.bench.ambient.pressure / 1e3
         return provenance(
             method=method,
             instrument=instrument,
@@ -157,7 +164,7 @@ class Task:
             reference=f"{self.standard.name}, u = {100 * self.standard.u:.3g} % of reading",
             environment=Environment(
                 temperature=self.temperature_c,
-                pressure=None if ambient is None else ambient / 1e3,
+                pressure=ambient_kpa,
             ),
             simulated=self.simulated,
         )
@@ -180,7 +187,7 @@ def new_task(
     workspace = Workspace.find()
     bench = workspace.bench(order.bench)
     calibrations = workspace.resolve_bench(bench)
-    if bench.virtual is not None and order.points is None:
+    if bench.simulated and bench.virtual is not None:
         known = standard(bench.virtual.references)
     elif order.reference is None or order.reference_u is None:
         raise typer.BadParameter(

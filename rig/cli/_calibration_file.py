@@ -7,11 +7,11 @@ from pathlib import Path
 
 from rich.console import Console
 
-from rig.board.virtual_calibration import CELSIUS
 from rig.spec.bench import BenchSpec
 from rig.spec.calibration import Environment, Provenance
 from rig.spec.calibration_file import free_path, write_calibration
 from rig.spec.loading import AnyCalibration
+from rig.spec.quantity import CELSIUS
 from rig.spec.workspace import Workspace
 
 

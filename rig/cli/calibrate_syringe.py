@@ -9,6 +9,9 @@ import typer
 from rig.cli import _calibration_options as options
 from rig.cli.calibrate import calibrate
 
+UNMEASURED_U = 1.0
+"""kPa that the weather, and deg C that a room, may differ by from what a bench says."""
+
 
 @calibrate.command()
 def syringe(
@@ -18,6 +21,22 @@ def syringe(
     tube_u_ml: Annotated[
         float, typer.Option(min=0, help="Standard uncertainty of the tube's volume, mL.")
     ] = 0.05,
+    ambient_kpa: Annotated[
+        float | None,
+        typer.Option(min=50, max=120, help="Of the lab; default: what the bench says."),
+    ] = None,
+    ambient_u_kpa: Annotated[
+        float | None,
+        typer.Option(min=0, help="Its standard uncertainty; default: 1, on a simulated bench 0."),
+    ] = None,
+    temperature_u_c: Annotated[
+        float | None,
+        typer.Option(
+            min=0,
+            max=5,
+            help="Standard uncertainty of the water's temperature; default: 1, simulated 0.",
+        ),
+    ] = None,
     points: options.Points = None,
     out: options.Out = None,
     operator: options.Operator = "",
@@ -37,8 +56,8 @@ def syringe(
 
         rig calibrate syringe
 
-        rig calibrate syringe --bench mega --temperature-c 22.5 --reference "Kern PCB 350-3"
-        --reference-u 0.01
+        rig calibrate syringe --bench mega --temperature-c 22.5 --temperature-u-c 0.2
+        --ambient-kpa 99.83 --ambient-u-kpa 0.05 --reference "Kern PCB 350-3" --reference-u 0.01
     """
     from rig.calibrate.syringe import COLUMNS, Surroundings, fit_syringe
     from rig.cli._calibration import new_task, order_of
@@ -55,16 +74,18 @@ def syringe(
         lambda bench, link, taken, stage: syringe_points(bench, link, plan, taken, stage),
         COLUMNS,
     )
+    guess = 0.0 if task.simulated else UNMEASURED_U
     around = Surroundings(
-        ambient_kpa=task.bench.ambient.pressure / 1e3,
+        ambient_kpa=task.bench.ambient.pressure / 1e3 if ambient_kpa is None else ambient_kpa,
+        ambient_u_kpa=guess if ambient_u_kpa is None else ambient_u_kpa,
         temperature_c=task.temperature_c,
+        temperature_u_c=guess if temperature_u_c is None else temperature_u_c,
         volume_per_step_ul=task.parameters["volume_per_step_ul"],
         syringe_ml=syringe_ml,
         tube_ml=task.bench.tubing.volume * 1e6,
         tube_u_ml=tube_u_ml,
         balance_u=task.standard.u,
-        pressure_u=task.calibrations.transducer.gain_u,
-        zero_u_kpa=task.calibrations.transducer.zero_u / 1e3,
+        transducer=task.calibrations.transducer,
     )
     fit = fit_syringe(rows, around)
     made = fit.calibration(
@@ -72,6 +93,7 @@ def syringe(
         task.provenance(
             "water weighed, then gas compressed behind a plug (Boyle's law); least squares",
             f"syringe of {syringe_ml:g} mL and its drive",
+            ambient_kpa,
         ),
     )
     task.finish(

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 STANDARD_GRAVITY = 9.80665
 """m/s2; newtons in a kilogram-force."""
+CELSIUS = 273.15
+"""K at 0 deg C."""
 MAX_CHARACTERS = 60
 
 # The grammar is checked before pint sees the text: pint evaluates arithmetic such as 2**9999999.

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from rig.calibrate.air import BUOYANCY
 from rig.calibrate.curve import fit_curve
 from rig.calibrate.errors import CalibrateError
 from rig.calibrate.least_squares import least_squares, widening
-from rig.calibrate.load_cell import BUOYANCY, fit_creep, fit_load_cell, grams_force
+from rig.calibrate.load_cell import fit_creep, fit_load_cell, grams_force
 from rig.calibrate.points import Row, above_zero, read_points
-from rig.calibrate.syringe import Surroundings, fit_syringe, water_density
+from rig.calibrate.syringe import Surroundings, fit_syringe, shown_density, water_density
 from rig.calibrate.transducer import fit_transducer
-from rig.spec.calibration import Provenance
+from rig.spec.calibration import Provenance, TransducerCalibration
 from rig.spec.calibration_file import calibration_text, free_path, write_calibration
 from rig.spec.errors import SpecError
 from rig.spec.loading import parse_calibration
@@ -162,11 +164,34 @@ def test_water_has_the_density_of_the_table() -> None:
         assert water_density(celsius) * 1e3 == pytest.approx(density, abs=1e-4)
 
 
+def test_a_balance_in_air_shows_less_than_the_mass_of_water() -> None:
+    assert shown_density(20) == pytest.approx(0.9972, abs=5e-5)
+    # ISO 8655-6:2002, Table A.1: 1.0032 uL/mg at 23.0 deg C (997.538 kg/m3) and 100 kPa
+    assert 1 / shown_density(23) == pytest.approx(1.0035, abs=5e-5)
+
+
+def transducer(bow: float = 0.0, linearity_u: float = 0.0) -> TransducerCalibration:
+    return TransducerCalibration.model_validate(
+        {
+            "kind": "calibration",
+            "instrument": "transducer",
+            "gain": 10,
+            "gain_u": 1e-3,
+            "offset_voltage": 0.5,
+            "span": 40,
+            "bow": bow,
+            "linearity_u": linearity_u,
+            "zero_u": 0.005,
+            "provenance": PROVENANCE,
+        }
+    )
+
+
 def test_a_syringe_is_found_from_water_and_gas() -> None:
     scale, dead, backlash, tube, ambient = 1.002, 2.1, 0.01, 1.5, 101.325
     rows: list[Row] = [
         {"kind": "dispense", "plunger_ml": x, "pressure_kpa": 0.0}
-        | {"water_g": scale * x * water_density(23)}
+        | {"water_g": scale * x * (water_density(23) - 0.0012) / (1 - 1.5e-4)}
         for x in (8.0, 16.0, 24.0, 32.0)
     ]
     at_home = 60 + dead + tube
@@ -178,13 +203,45 @@ def test_a_syringe_is_found_from_water_and_gas() -> None:
             rows.append(
                 {"kind": way, "plunger_ml": counted, "pressure_kpa": pressure, "water_g": 0.0}
             )
-    around = Surroundings(ambient, 23, 0.35, 60, tube, 0.02, 1e-4, 1e-3, 0.0)
+    around = Surroundings(ambient, 0.0, 23, 0.0, 0.35, 60, tube, 0.02, 1e-4, transducer())
     fit = fit_syringe(rows, around)
     made = fit.calibration(rows, PROVENANCE)
     assert made.steps_per_ml == pytest.approx(1e3 / (0.35 * scale), rel=1e-9)
     assert made.backlash * 1e6 == pytest.approx(backlash, rel=1e-6)
     assert made.dead_volume * 1e6 == pytest.approx(dead, rel=1e-6)
     assert made.dead_volume_u * 1e6 == pytest.approx(np.hypot(0.02, 62.6e-3), rel=0.02)
+    zero_ml = 62.6 * 0.005 / ambient
+    assert made.backlash_u * 1e6 == pytest.approx(zero_ml, rel=0.01)
+
+    weather = replace(around, ambient_u_kpa=1.0, temperature_u_c=1.0)
+    unsure = fit_syringe(rows, weather).calibration(rows, PROVENANCE)
+    # water expands by 2.38e-4 per kelvin at 23 deg C
+    assert unsure.steps_per_ml_u == pytest.approx(np.hypot(1e-4, 2.38e-4), rel=0.01)
+    parts = [0.02, 62.6e-3, 62.6 / ambient, 62.6 * 2.58e-4, zero_ml]
+    assert unsure.dead_volume_u * 1e6 == pytest.approx(np.linalg.norm(parts), rel=0.005)
+
+
+def test_the_bow_of_the_transducer_is_taken_out_before_gas_is_fitted() -> None:
+    ambient, enclosed, curved = 101.325, 62.0, transducer(bow=0.1)
+    rows: list[Row] = [
+        {"kind": "dispense", "plunger_ml": x, "pressure_kpa": 0.0}
+        | {"water_g": x * shown_density(23)}
+        for x in (8.0, 16.0, 24.0, 32.0)
+    ]
+    for way, indicated in [("up", (1.0, 4.0, 8.0, 13.0)), ("down", (11.0, 6.0, 2.0))]:
+        for shown_kpa in indicated:
+            p = shown_kpa + 0.1 * 4 * shown_kpa / 40 * (1 - shown_kpa / 40)
+            counted = 1 + enclosed * p / (ambient + p)
+            rows.append(
+                {"kind": way, "plunger_ml": counted, "pressure_kpa": shown_kpa, "water_g": 0.0}
+            )
+    around = Surroundings(ambient, 0.0, 23, 0.0, 0.35, 60, 1.5, 0.0, 0.0, curved)
+    fit = fit_syringe(rows, around)
+    assert fit.dead_ml == pytest.approx(enclosed + 1 - 61.5, abs=1e-6)
+    unsure = fit_syringe(rows, replace(around, transducer=transducer(0.1, linearity_u=0.05)))
+    assert unsure.dead_u_ml == pytest.approx(
+        np.hypot(fit.dead_u_ml, enclosed * 0.05 / ambient), rel=1e-6
+    )
 
 
 def test_a_calibration_survives_its_file(tmp_path: Path) -> None:

@@ -5,13 +5,14 @@ E_n is the error over the expanded uncertainty (ISO 13528:2022, 9.7): within +-1
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import date
 
 import numpy as np
 import pytest
 
 from rig.board.virtual import VirtualBench
-from rig.board.virtual_calibration import CELSIUS, VirtualCalibrationBench
+from rig.board.virtual_calibration import VirtualCalibrationBench, VirtualReferenceSet
 from rig.board.virtual_target import hidden_lean
 from rig.calibrate.load_cell import fit_load_cell
 from rig.calibrate.points import Row
@@ -38,6 +39,7 @@ from rig.spec.calibration import (
     SyringeCalibration,
     TransducerCalibration,
 )
+from rig.spec.quantity import CELSIUS
 from rig.spec.workspace import Workspace
 
 from .conftest import ROOT, make_request
@@ -122,14 +124,15 @@ def calibrated_syringe(seed: int) -> tuple[Instruments, SyringeCalibration]:
     )
     around = Surroundings(
         ambient_kpa=BENCH.ambient.pressure / 1e3,
+        ambient_u_kpa=0.0,
         temperature_c=BENCH.ambient.temperature - CELSIUS,
+        temperature_u_c=0.0,
         volume_per_step_ul=PARAMETERS["volume_per_step_ul"],
         syringe_ml=BENCH.syringe.volume * 1e6,
         tube_ml=BENCH.tubing.volume * 1e6,
         tube_u_ml=0.0,
         balance_u=REFERENCES.balance_u,
-        pressure_u=CALIBRATIONS.transducer.gain_u,
-        zero_u_kpa=CALIBRATIONS.transducer.zero_u / 1e3,
+        transducer=CALIBRATIONS.transducer,
     )
     return bench.instruments, fit_syringe(rows, around).calibration(rows, PROVENANCE)
 
@@ -208,6 +211,18 @@ def test_the_reference_gauge_has_an_error_of_its_own() -> None:
         truth = bench.plant.truth().gauge_pressure / 1e3
         readings.append(bench.references.gauge_kpa(0.0, lambda: None) / truth - 1)
     assert np.std(readings) == pytest.approx(REFERENCES.gauge_u, rel=0.6)
+
+
+def test_the_balance_weighs_water_in_air(monkeypatch: pytest.MonkeyPatch) -> None:
+    plant = VirtualCalibrationBench(BENCH, 1).plant
+    exact = REFERENCES.model_copy(update={"balance_u": 0.0, "balance_resolution": 0.0})
+    balance = VirtualReferenceSet(plant, exact, 20.0, np.random.default_rng(1))
+    balance.fill(lambda: None)
+    truth = plant.truth()
+    pushed = replace(truth, pushed_volume=truth.pushed_volume + 1e-6)
+    monkeypatch.setattr(plant, "truth", lambda: pushed)
+    # 1 mL: 0.9982 g of water displace 1.2 mg of air
+    assert balance.water_g(lambda: None) == pytest.approx(0.9972, abs=5e-5)
 
 
 def test_a_calibration_that_is_stopped_leaves_the_bench_vented_and_its_points() -> None:
