@@ -45,7 +45,7 @@ def optimise(
     from rig.study.plan import make_space
     from rig.study.results import Folder
     from rig.study.search import Memory, search
-    from rig.study.search_plots import plot_search
+    from rig.study.search_plots import FEWEST_DRAWN, plot_search
 
     workspace = Workspace.find()
     path = workspace.path("optimisation", file)
@@ -59,13 +59,17 @@ def optimise(
         found = search(spec, memory)
     if found.best:
         _write(folder.path, found)
-        if plot:
-            plot_search(folder.path / "search.png", found)
     told = _plain(found, default)
     if as_json:
         typer.echo(json.dumps(told, indent=2))
     else:
         _show(console, told, folder.path)
+    if plot and told["feasible"] >= FEWEST_DRAWN:
+        plot_search(folder.path / "search.png", found)
+    elif plot and found.best:
+        console.print(
+            f"no picture: {told['feasible']} evaluations kept all limits, {FEWEST_DRAWN} make one"
+        )
     if interruption.requested:
         raise KeyboardInterrupt
     if not found.best:
@@ -95,11 +99,12 @@ def _plain(found: Found, default: Answer) -> dict[str, Any]:
 
 
 def _write(folder: Path, found: Found) -> None:
-    """The best actuators; of a changed material its file, too."""
+    """The best actuators, in place of those of an earlier search, and all evaluations."""
     import json
 
-    from rig.study.results import write_specs
+    from rig.study.results import remove_specs, write_specs, write_whole
 
+    remove_specs(folder, "best")
     for number, one in enumerate(found.best, 1):
         assert one.point.task is not None
         write_specs(folder, f"best-{number}", one.point.task, found.memory.space)
@@ -107,7 +112,7 @@ def _write(folder: Path, found: Found) -> None:
         {**one.point.values, **(one.answer.values or {}), "error": one.answer.error}
         for one in found.memory.evaluations
     ]
-    (folder / "evaluations.json").write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    write_whole(folder / "evaluations.json", (json.dumps(rows, indent=1) + "\n").encode())
 
 
 def _show(console: Any, told: dict[str, Any], folder: Path) -> None:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from rig.study.analysis import Analysis
     from rig.study.executor import Executor
+    from rig.study.optimum import Optimum
     from rig.study.plan import Plan
     from rig.study.run import Standing, Study
     from rig.study.surface import Surface
@@ -71,7 +72,9 @@ def study(
         console.print(_points(plan))
         return
     folder = Folder(out or Path("studies") / plan.spec.name)
-    how = {"executor": executor.value, "workers": workers, "threads": threads}
+    how: dict[str, Any] = {"executor": executor.value}
+    if executor is not ExecutorName.HERE:  # this process has no workers and its own threads
+        how |= {"workers": workers, "threads": threads}
     with catching_signals("stopping; the points that are done are kept") as interruption:
         watch = _Watch(console, lambda: interruption.requested)
         finished = run_study(
@@ -167,24 +170,41 @@ def _show(console: Console, finished: Study, analysis: Analysis) -> None:
             for name, value in surface.actual_coefficients().items()
         )
         console.print(f"{surface.response} = {equation}".replace("+ -", "- "), soft_wrap=True)
+        normality = surface.diagnostics.normality
+        if normality is not None:
+            console.print(
+                f"residuals: p = {normality:.3g} (Shapiro-Wilk), small where they are not normal"
+            )
         point = analysis.stationary.get(surface.response)
         if point is not None:
             place = _place(analysis, point.actual, point.spread)
             where = "inside" if point.inside else "outside of the levels"
             console.print(
                 f"stationary point ({point.nature}, {where}): {place}; {surface.response} = "
-                f"{point.value:.4g}",
+                f"{point.value:.4g}; curvatures in coded factors "
+                + ", ".join(f"{value:.4g}" for value in point.eigenvalues),
                 soft_wrap=True,
             )
     if analysis.best is not None:
         best = analysis.best
         console.print(
             f"optimum: {_place(analysis, best.actual, best.spread)}; {best.value:.5g}, one more "
-            f"run within {best.interval[0]:.5g} to {best.interval[1]:.5g} (95 %)",
+            f"run within {best.interval[0]:.5g} to {best.interval[1]:.5g} (95 %)"
+            + "".join(f"; {name} = {value:.5g}" for name, value in _limited(analysis, best).items())
+            + "".join(f"; {name} is at a level" for name in _on_bounds(analysis, best)),
             soft_wrap=True,
         )
     for remark in analysis.remarks:
         console.print(f"remark: {remark}", soft_wrap=True, markup=False)
+
+
+def _limited(analysis: Analysis, best: Optimum) -> dict[str, float]:
+    return dict(zip(analysis.limited, best.limited, strict=True))
+
+
+def _on_bounds(analysis: Analysis, best: Optimum) -> list[str]:
+    """Factors that the optimum has at one of their levels: beyond may be better."""
+    return [f.name for f, at in zip(analysis.factors, best.on_bounds, strict=True) if at]
 
 
 def _place(analysis: Analysis, values: Any, spread: Any) -> str:
@@ -225,6 +245,8 @@ def _as_json(finished: Study, analysis: Analysis) -> str:
             "spread": _by_factor(analysis, analysis.best.spread),
             "value": analysis.best.value,
             "interval": analysis.best.interval,
+            "limited": _limited(analysis, analysis.best),
+            "on_bounds": _on_bounds(analysis, analysis.best),
         },
         "remarks": analysis.remarks,
     }
@@ -248,6 +270,7 @@ def _plain(surface: Surface, analysis: Analysis) -> dict[str, Any]:
         "r2_predicted": surface.r2_predicted,
         "adequate_precision": surface.adequate_precision,
         "coefficient_of_variation": surface.coefficient_of_variation,
+        "normality_p": surface.diagnostics.normality,
         "stationary_point": None
         if point is None
         else {
@@ -255,6 +278,7 @@ def _plain(surface: Surface, analysis: Analysis) -> dict[str, Any]:
             "spread": _by_factor(analysis, point.spread),
             "value": point.value,
             "nature": point.nature,
+            "curvatures": point.eigenvalues.tolist(),
             "inside": point.inside,
         },
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,12 +13,14 @@ from rig.cli.app import app
 if TYPE_CHECKING:
     from rig.study.updating import Measured, Prediction, Update
 
+_DEGREES = degrees(1)
+"""Degrees a radian."""
 _SHOWN = {
     "modulus": (1e-3, "kPa"),
     "wall": (1e3, "mm"),
     "free_parameter": (1.0, ""),
     "stiffening": (1.0, ""),
-    "offset": (57.29577951308232, "deg"),
+    "offset": (_DEGREES, "deg"),
     "effective_modulus": (1e-3, "kPa"),
 }
 
@@ -58,7 +61,13 @@ def update(
     import numpy as np
 
     from rig.record.reader import RunReader
-    from rig.study.updating import Priors, read_measured, update_model, without_pressures
+    from rig.study.updating import (
+        Priors,
+        read_measured,
+        require_same_actuator,
+        update_model,
+        without_pressures,
+    )
 
     setup = RunReader(run).setup()
     measured = read_measured(run)
@@ -66,6 +75,7 @@ def update(
     if hold_out is not None:
         measured, unseen["held out"] = without_pressures(measured, np.array(_pressures(hold_out)))
     if predict is not None:
+        require_same_actuator(setup, RunReader(predict).setup())
         unseen[str(predict)] = read_measured(predict)
     priors = Priors(modulus / 100, wall / 100, free_parameter / 100)
     found = update_model(setup.actuator, setup.material, measured, priors, mcmc=mcmc, seed=seed)
@@ -114,6 +124,8 @@ def _show(found: Update, foretold: dict[str, tuple[Prediction, Prediction]]) -> 
     from rich.console import Console
     from rich.table import Table
 
+    from rig.mechanics.table import GRAM_FORCE
+
     console = Console()
     table = Table("parameter", "before", "after", "95 %", "unit")
     for one in found.estimates:
@@ -132,8 +144,8 @@ def _show(found: Update, foretold: dict[str, tuple[Prediction, Prediction]]) -> 
     )
     for name, (angles, forces) in foretold.items():
         for kind, p, factor, unit in (
-            ("angle", angles, 57.29577951308232, "deg"),
-            ("force", forces, 1e3 / 9.80665, "g"),
+            ("angle", angles, _DEGREES, "deg"),
+            ("force", forces, 1 / GRAM_FORCE, "g"),
         ):
             if p.mean.size:
                 console.print(

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from rig.spec.base import Count, Integer, Name, Number, SpecModel, require
-from rig.spec.study import StudyFactor, StudyResponse
+from rig.spec.study import StudyFactor, StudyResponse, require_distinct
 
 
 class WantedResponse(StudyResponse):
@@ -70,9 +70,7 @@ class OptimisationSpec(SpecModel):
 
     @model_validator(mode="after")
     def _consistent(self) -> OptimisationSpec:
-        for what in ("factors", "responses"):
-            names = [one.name for one in getattr(self, what)]
-            require(len(set(names)) == len(names), f"expected {what} of different names")
+        require_distinct(self.factors, self.responses)
         objectives = sum(one.is_objective for one in self.responses)
         require(objectives > 0, "expected a response with a 'goal' or a 'target'")
         require(

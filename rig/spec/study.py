@@ -4,6 +4,7 @@ computed at every point.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -87,6 +88,11 @@ class StudyResponse(SpecModel):
     at_least: Number | None = Field(None, description="deg, mm, g, mL or kPa")
     at_most: Number | None = Field(None, description="deg, mm, g, mL or kPa")
 
+    @property
+    def is_limited(self) -> bool:
+        """Whether it must stay within limits."""
+        return self.at_least is not None or self.at_most is not None
+
     @model_validator(mode="after")
     def _limits_are_ordered(self) -> StudyResponse:
         if self.at_least is not None and self.at_most is not None:
@@ -97,6 +103,15 @@ class StudyResponse(SpecModel):
                 "a run measures 'angle' and 'blocked_force'",
             )
         return self
+
+
+def require_distinct(factors: Sequence[StudyFactor], responses: Sequence[StudyResponse]) -> None:
+    """For validators: refuse two factors of one name or field, and two responses of one name."""
+    for what, of_one_kind in (("factors", factors), ("responses", responses)):
+        names = {one.name for one in of_one_kind}
+        require(len(names) == len(of_one_kind), f"expected {what} of different names")
+    fields = {factor.field for factor in factors}
+    require(len(fields) == len(factors), "expected factors of different fields")
 
 
 class StudySpec(SpecModel):
@@ -115,11 +130,7 @@ class StudySpec(SpecModel):
 
     @model_validator(mode="after")
     def _consistent(self) -> StudySpec:
-        for what in ("factors", "responses"):
-            names = [one.name for one in getattr(self, what)]
-            require(len(set(names)) == len(names), f"expected {what} of different names")
-        fields = [factor.field for factor in self.factors]
-        require(len(set(fields)) == len(fields), "expected factors of different fields")
+        require_distinct(self.factors, self.responses)
         if self.design.kind == "box-behnken":
             require(len(self.factors) >= 3, "a Box-Behnken design needs three factors or more")
         if self.design.kind == "central-composite":

@@ -199,13 +199,12 @@ class Workspace:
         """
         folder = self.root / FOLDERS[kind]
         given = Path(reference)
-        is_path = given.suffix in SUFFIXES or len(given.parts) > 1
-        bases = [beside or Path.cwd(), self.root, folder] if is_path else [folder]
+        bases = [beside or Path.cwd(), self.root, folder] if is_path(given) else [folder]
         for base in bases:
             for name in (given, *(given.with_name(given.name + s) for s in SUFFIXES if given.name)):
                 if name.suffix in SUFFIXES and _is_file(base / name):
                     return base / name
-        if is_path:
+        if is_path(given):
             message = f"no such {kind} file; expected a path to one"
             names = self.names(kind)
             known = f", or a name from {folder}: {', '.join(names)}" if names else ""
@@ -313,6 +312,11 @@ def _value_at(spec: Any, location: Location) -> Any:
     for name in location:
         spec = getattr(spec, str(name))
     return spec
+
+
+def is_path(reference: str | Path) -> bool:
+    """Whether `reference` names a file by its path, not by its name in a workspace."""
+    return Path(reference).suffix in SUFFIXES or len(Path(reference).parts) > 1
 
 
 def is_workspace(folder: Path) -> bool:

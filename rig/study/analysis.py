@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.spec.study import FractionalFactorialDesign, FullFactorialDesign, StudySpec
+from rig.study.design import power_of_two
 from rig.study.errors import StudyError
 from rig.study.factors import (
     Array,
@@ -32,6 +33,8 @@ class Analysis:
     surfaces: dict[str, Surface]
     stationary: dict[str, StationaryPoint]
     best: Optimum | None
+    limited: tuple[str, ...]
+    """Responses with limits, in the order of `best.limited`."""
     remarks: tuple[str, ...]
 
 
@@ -47,6 +50,12 @@ def analyse(study: Study) -> Analysis:
         [[plan.in_lab_units(f.name, point.values[f.name]) for f in factors] for point, _ in sound]
     ).reshape(len(sound), len(factors))
     remarks = [f"point {p.name} is left out: {a.error}" for p, a in study.failed]
+    design = plan.spec.design
+    if design.kind == "sobol" and design.points != power_of_two(design.points):
+        remarks.append(
+            f"{design.points} points of a Sobol sequence are not balanced; a power of two, as "
+            f"{power_of_two(design.points)}, would be."
+        )
     surfaces: dict[str, Surface] = {}
     stationary: dict[str, StationaryPoint] = {}
     for response in plan.spec.responses:
@@ -74,7 +83,8 @@ def analyse(study: Study) -> Analysis:
         best = _optimum(study, surfaces)
     except StudyError as error:
         remarks.append(str(error))
-    return Analysis(factors, points, surfaces, stationary, best, tuple(remarks))
+    limited = tuple(one.name for one in plan.spec.responses if one.is_limited)
+    return Analysis(factors, points, surfaces, stationary, best, limited, tuple(remarks))
 
 
 def _terms(spec: StudySpec, factors: tuple[Factor, ...]) -> tuple[Term, ...]:
@@ -95,13 +105,16 @@ def _optimum(study: Study, surfaces: dict[str, Surface]) -> Optimum | None:
     if not wanted:
         return None
     name, goal = wanted[0]
+    limited = [one for one in responses if one.is_limited]
+    for one in limited:
+        if one.name not in surfaces:
+            raise StudyError(f"no optimum: the limit on '{one.name}' cannot be judged: no surface.")
     limits = [
         Limit(
             surfaces[one.name],
             -np.inf if one.at_least is None else one.at_least,
             np.inf if one.at_most is None else one.at_most,
         )
-        for one in responses
-        if one.name in surfaces and (one.at_least is not None or one.at_most is not None)
+        for one in limited
     ]
     return optimum(surfaces[name], Goal(goal), limits)

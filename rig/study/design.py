@@ -45,11 +45,18 @@ def coded_points(design: Design, count: int) -> Array:
         case _:
             if design.points > MOST_POINTS:
                 raise StudyError(f"{design.points} points are too many; at most {MOST_POINTS}.")
-            sampler = (qmc.Sobol if design.kind == "sobol" else qmc.LatinHypercube)(
-                count, rng=np.random.default_rng(design.seed)
-            )
-            points = 2 * sampler.random(design.points) - 1
+            rng = np.random.default_rng(design.seed)
+            if design.kind == "sobol":  # scipy warns of counts that are no power of two
+                whole = qmc.Sobol(count, rng=rng).random(power_of_two(design.points))
+            else:
+                whole = qmc.LatinHypercube(count, rng=rng).random(design.points)
+            points = 2 * whole[: design.points] - 1
     return np.asarray(points, dtype=np.float64)
+
+
+def power_of_two(count: int) -> int:
+    """The least one that is not below `count`: so many points of a Sobol sequence are balanced."""
+    return 1 << (count - 1).bit_length()
 
 
 def _fraction(generators: str) -> Array:

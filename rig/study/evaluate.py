@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from rig.mechanics.table import COLUMNS, rows
 from rig.spec.study import QuantityName, StudyResponse
 from rig.study.errors import StudyError
 from rig.study.plan import Task
+from rig.study.summary import read_experiments
 
 UNITS: dict[QuantityName, str] = {
     "angle": "deg",
@@ -60,26 +61,14 @@ def _of_model(task: Task, model: str, responses: list[StudyResponse]) -> dict[st
 
 def _of_run(task: Task, responses: list[StudyResponse]) -> dict[str, float]:
     assert task.runs is not None
-    summary = _summary(task.runs / task.name / "summary.json")
-    return {one.name: _measured(task.runs / task.name, summary, one) for one in responses}
+    run = task.runs / task.name
+    experiments = read_experiments(run)
+    return {one.name: _measured(run, experiments, one) for one in responses}
 
 
-def _summary(path: Path) -> dict[str, Any]:
-    try:
-        summary = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        raise StudyError(
-            f"{path} is not there, or is no summary: take the run of this point first, as "
-            f"`rig characterise --actuator POINT.yaml --out {path.parent}`."
-        ) from None
-    if summary.get("status") != "success":
-        raise StudyError(f"{path.parent}: the run ended with status '{summary.get('status')}'.")
-    return dict(summary)
-
-
-def _measured(run: Path, summary: dict[str, Any], one: StudyResponse) -> float:
+def _measured(run: Path, experiments: Mapping[str, Any], one: StudyResponse) -> float:
     """Mean over the branches at the response's pressure."""
-    experiment = summary["experiments"].get(_EXPERIMENTS[one.quantity], {})
+    experiment = experiments.get(_EXPERIMENTS[one.quantity], {})
     wanted = one.pressure / 1e3
     found = [
         point["mean"]

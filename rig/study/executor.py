@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -20,12 +21,7 @@ from typing import Any, Protocol
 from rig.errors import RigError
 from rig.study.extras import package
 
-THREAD_VARIABLES = (
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "NUMBA_NUM_THREADS",
-)
+THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 ATTEMPTS = 2
 """Of a point whose worker dies."""
 _GRACE_S = 5.0
@@ -41,17 +37,19 @@ class Outcome:
     error: str | None
     seconds: float
     worker: str
+    defect: bool = False
+    """Whether an exception that nobody foresaw ended it, as for want of memory."""
     crashed: bool = False
-    """Whether the worker died of it, or without a reason of its own: another time it may work."""
+    """Whether the worker died of it, or without a reason of its own."""
+
+    @property
+    def lasting(self) -> bool:
+        """Whether the same task would end so again; after a defect or a crash it may work."""
+        return not (self.defect or self.crashed)
 
 
 class Executor(Protocol):
     """Computes a function, which must be importable by its name, for all tasks."""
-
-    @property
-    def workers(self) -> int:
-        """How many tasks are computed at a time."""
-        ...
 
     def map(self, function: Callable[[Any], Any], tasks: Sequence[Any]) -> Iterator[Outcome]:
         """Outcomes as they come; closing the iterator stops what is left."""
@@ -62,13 +60,11 @@ class Executor(Protocol):
 class InProcess:
     """One after the other, here."""
 
-    workers: int = 1
-
     def map(self, function: Callable[[Any], Any], tasks: Sequence[Any]) -> Iterator[Outcome]:
         """Outcomes in order."""
         for index, task in enumerate(tasks):
-            value, error, seconds = timed(function, task)
-            yield Outcome(index, value, error, seconds, "here")
+            value, error, seconds, defect = timed(function, task)
+            yield Outcome(index, value, error, seconds, "here", defect)
 
 
 @dataclass(frozen=True)
@@ -136,8 +132,8 @@ class _Worker:
     def outcome(self) -> Outcome:
         name = f"process {self.process.pid}"
         try:
-            value, error, seconds = self.pipe.recv()
-            return Outcome(self.index, value, error, seconds, name)
+            value, error, seconds, defect = self.pipe.recv()
+            return Outcome(self.index, value, error, seconds, name, defect)
         except (EOFError, ConnectionResetError):
             self.process.join(_GRACE_S)
             why = f"the worker died (exit status {self.process.exitcode})"
@@ -154,23 +150,25 @@ class _Worker:
 
 def _serve(pipe: Connection, function: Callable[[Any], Any]) -> None:
     """What a worker does until nobody asks any more."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C is for the parent to answer
     try:
         while True:
             pipe.send(timed(function, pipe.recv()))
-    except (EOFError, BrokenPipeError, ConnectionResetError, KeyboardInterrupt):
+    except (EOFError, BrokenPipeError, ConnectionResetError):
         return
 
 
-def timed(function: Callable[[Any], Any], task: Any) -> tuple[Any, str | None, float]:
-    """Value or error of a task, and the seconds that it took."""
+def timed(function: Callable[[Any], Any], task: Any) -> tuple[Any, str | None, float, bool]:
+    """Value or error of a task, the seconds that it took, and whether the error is a defect."""
     began = time.monotonic()
+    value, error, defect = None, None, False
     try:
-        value, error = function(task), None
+        value = function(task)
     except RigError as problem:
-        value, error = None, str(problem)
-    except Exception as defect:  # one point must not cost the others
-        value, error = None, f"defect: {type(defect).__name__}: {defect}"
-    return value, error, time.monotonic() - began
+        error = str(problem)
+    except Exception as unforeseen:  # one point must not cost the others
+        error, defect = f"defect: {type(unforeseen).__name__}: {unforeseen}", True
+    return value, error, time.monotonic() - began, defect
 
 
 @contextmanager
@@ -194,7 +192,6 @@ class DaskCluster:
 
     start: Callable[[], Any]
     """Makes the cluster (dask.distributed's or dask-jobqueue's), to be closed by its `close`."""
-    workers: int
 
     def map(self, function: Callable[[Any], Any], tasks: Sequence[Any]) -> Iterator[Outcome]:
         """Outcomes as they come; tasks of workers that died are given to others by the scheduler,
@@ -207,8 +204,8 @@ class DaskCluster:
             }
             for future in distributed.as_completed(futures):
                 if future.status == "finished":
-                    value, error, seconds = future.result()
-                    yield Outcome(futures[future], value, error, seconds, "dask")
+                    value, error, seconds, defect = future.result()
+                    yield Outcome(futures[future], value, error, seconds, "dask", defect)
                 else:
                     problem = future.exception()
                     why = f"the worker died: {type(problem).__name__}"
@@ -229,7 +226,7 @@ def local_dask(workers: int, threads: int = 1) -> DaskCluster:
                 host="127.0.0.1",
             )
 
-    return DaskCluster(start, workers)
+    return DaskCluster(start)
 
 
 def slurm(workers: int, threads: int = 1, **options: Any) -> DaskCluster:
@@ -253,4 +250,4 @@ def slurm(workers: int, threads: int = 1, **options: Any) -> DaskCluster:
         cluster.adapt(minimum=workers, maximum=workers)  # replaces jobs that end
         return cluster
 
-    return DaskCluster(start, workers)
+    return DaskCluster(start)

@@ -50,8 +50,6 @@ class StationaryPoint:
     value: float
     eigenvalues: Array
     """Curvatures along the principal axes, per coded unit squared, ascending, (k,)."""
-    axes: Array
-    """Principal axes as columns, (k, k)."""
     nature: Nature
     inside: bool
     """Whether it lies between the factors' levels."""
@@ -79,7 +77,7 @@ class Optimum:
     interval: tuple[float, float]
     """95 % prediction interval for a run there."""
     limited: tuple[float, ...]
-    """Expected values of the limited responses."""
+    """Expected values of the limited responses, in the order of the limits."""
     on_bounds: tuple[bool, ...]
     """For each factor whether it is at one of its levels."""
 
@@ -88,7 +86,7 @@ def stationary_point(surface: Surface, seed: int = 0) -> StationaryPoint:
     """Canonical analysis; raises StudyError for a surface without curvature in some direction."""
     point = _stationary(surface)
     _, _, matrix = surface.quadratic_form()
-    curvature, axes = np.linalg.eigh(2 * matrix)
+    curvature = np.linalg.eigvalsh(2 * matrix)
     natures = {(True, False): Nature.MINIMUM, (False, True): Nature.MAXIMUM}
     small = 1e-9 * np.max(np.abs(curvature))
     nature = natures.get(
@@ -108,8 +106,7 @@ def stationary_point(surface: Surface, seed: int = 0) -> StationaryPoint:
         actual=actual(surface.factors, point),
         spread=np.asarray((high - low) / 2),
         value=float(surface.predict(point)[0]),
-        eigenvalues=curvature,
-        axes=axes,
+        eigenvalues=np.asarray(curvature, dtype=np.float64),
         nature=nature,
         inside=bool(np.all(np.abs(point) <= 1)),
     )

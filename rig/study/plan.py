@@ -33,7 +33,7 @@ class Task:
 
     @property
     def key(self) -> str:
-        """Of everything that an answer depends on, the code that answers included.
+        """Of spec, material, what is asked, and the source of `rig.mechanics`, which answers.
 
         Runs answer for the point's name, models for its spec alone, so that replicates share an
         answer.

@@ -43,7 +43,7 @@ def plot_surface(path: Path, surface: Surface, points: Array) -> None:
             zlabel=surface.response,
         )
     figure.suptitle(surface.response)
-    _save(figure, path)
+    save(figure, path)
 
 
 def plot_residuals(path: Path, surface: Surface) -> None:
@@ -71,7 +71,7 @@ def plot_residuals(path: Path, surface: Surface) -> None:
     effects.barh(names, [sizes[name] for name in names])
     effects.set(xlabel="|coefficient| / standard error", title="effects (coded factors)")
     figure.suptitle(surface.response)
-    _save(figure, path)
+    save(figure, path)
 
 
 def _grid(surface: Surface, i: int, j: int) -> tuple[Array, Array, Array]:
@@ -83,7 +83,8 @@ def _grid(surface: Surface, i: int, j: int) -> tuple[Array, Array, Array]:
     return where[:, i].reshape(u.shape), where[:, j].reshape(u.shape), values
 
 
-def _save(figure: Any, path: Path) -> None:
+def save(figure: Any, path: Path) -> None:
+    """Write a matplotlib figure; raises StudyError where that is impossible."""
     try:
         figure.savefig(path)
     except (OSError, ValueError) as error:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import tempfile
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rig import __version__
+from rig.spec.workspace import is_path
 from rig.study.errors import StudyError
 from rig.study.evaluate import UNITS
 from rig.study.plan import Plan, Point, Space, Task
@@ -47,7 +48,7 @@ class Folder:
     def keep(self, key: str, answer: Answer) -> None:
         """Write an answer, as a whole or not at all; raises StudyError."""
         content = {"values": answer.values, "error": answer.error, "seconds": answer.seconds}
-        self._write(self._answer(key), json.dumps(content).encode())
+        write_whole(self._answer(key), json.dumps(content).encode())
 
     def finish(
         self, plan: Plan, answers: Sequence[tuple[Point, Answer]], how: Mapping[str, Any]
@@ -60,37 +61,55 @@ class Folder:
         buffer = pa.BufferOutputStream()
         pq.write_table(table, buffer)
         data = buffer.getvalue().to_pybytes()
-        self._write(self.path / RESULTS, data)
+        write_whole(self.path / RESULTS, data)
         manifest = _manifest(plan, answers, how, hashlib.sha256(data).hexdigest())
-        self._write(self.path / MANIFEST, (json.dumps(manifest, indent=2) + "\n").encode())
+        write_whole(self.path / MANIFEST, (json.dumps(manifest, indent=2) + "\n").encode())
 
     def _answer(self, key: str) -> Path:
         return self.path / ANSWERS / f"{key}.json"
 
-    def _write(self, path: Path, data: bytes) -> None:
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file as a whole or not at all; raises StudyError."""
+    partial = path.with_name(f"{path.name}.partial")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
+            with partial.open("wb") as file:
                 file.write(data)
                 file.flush()
                 os.fsync(file.fileno())
-            Path(file.name).replace(path)
-        except OSError as error:
-            raise StudyError(
-                f"results cannot be written to {path}: {error.strerror}. Name a folder that you "
-                f"may write to, on a disk with room."
-            ) from None
+            partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
+    except OSError as error:
+        raise StudyError(
+            f"results cannot be written to {path}: {error.strerror}. Name a folder that you "
+            f"may write to, on a disk with room."
+        ) from None
+
+
+def remove_specs(folder: Path, stem: str) -> None:
+    """Remove what `write_specs` wrote as STEM-1, STEM-2, ...; raises StudyError."""
+    ours = re.compile(rf"{re.escape(stem)}-\d+(-material)?\.yaml")
+    try:
+        for path in list(folder.glob("*.yaml")):
+            if ours.fullmatch(path.name):
+                path.unlink()
+    except OSError as error:
+        raise StudyError(f"{folder}: old specs cannot be removed: {error.strerror}.") from None
 
 
 def write_specs(folder: Path, name: str, task: Task, space: Space) -> None:
-    """A point's actuator as NAME.yaml, and its material beside it where that differs.
+    """A point's actuator as NAME.yaml, and its material beside it.
 
-    Raises StudyError where they cannot be written.
+    The material is left out where it is the workspace's own, called by its name: a path to it need
+    not lead there from `folder`. Raises StudyError where they cannot be written.
     """
     actuator = task.actuator.model_dump(mode="json", exclude_none=True)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        if task.material != space.material:
+        if task.material != space.material or is_path(task.actuator.material):
             material = task.material.model_dump(mode="json", exclude_none=True)
             _write_yaml(folder / f"{name}-material.yaml", material)
             actuator["material"] = f"./{name}-material.yaml"

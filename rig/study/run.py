@@ -72,7 +72,7 @@ def run_study(
         answer = Answer(outcome.value, outcome.error, outcome.seconds)
         key = keys[outcome.index]
         known[key] = answer
-        if not outcome.crashed:
+        if outcome.lasting:
             folder.keep(key, answer)
         left = (time.monotonic() - began) / done * (len(keys) - done)
         if not watch(Standing(done, len(keys), left)):

@@ -21,6 +21,7 @@ from rig.spec.optimisation import (
     OptimisationSpec,
     WantedResponse,
 )
+from rig.study.design import power_of_two
 from rig.study.evaluate import evaluate
 from rig.study.executor import timed
 from rig.study.extras import package
@@ -88,10 +89,10 @@ class Memory:
         if known is None and self.folder is not None:
             known = self.folder.known(point.key)
         if known is None:
-            value, error, seconds = timed(self.function, point.task)
+            value, error, seconds, defect = timed(self.function, point.task)
             known = Answer(value, error, seconds)
             self.computed += 1
-            if self.folder is not None:
+            if self.folder is not None and not defect:
                 self.folder.keep(point.key, known)
         self._known[point.key] = known
         return known
@@ -190,7 +191,7 @@ def _cobyla(how: CobylaSearch, memory: Memory) -> None:
     limits = {"type": "ineq", "fun": lambda x: -at(x).violation}
     bounds = [{"type": "ineq", "fun": lambda x: np.concatenate([x, 1 - x])}]
     rng = np.random.default_rng(how.seed)
-    starts = qmc.Sobol(k, rng=rng).random(2 ** int(np.ceil(np.log2(max(how.starts, 2)))))
+    starts = qmc.Sobol(k, rng=rng).random(power_of_two(how.starts))
     own = memory.space.own
     if own is not None:
         starts[0] = (own + 1) / 2
@@ -216,10 +217,9 @@ def _nsga(how: NsgaSearch, memory: Memory) -> None:
     problems = package("pymoo.core.problem", "search")
     algorithm = package("pymoo.algorithms.moo.nsga2", "search").NSGA2(pop_size=how.population)
     minimize = package("pymoo.optimize", "search").minimize
-    objectives = sum(one.is_objective for one in memory.responses)
-    limits = 1 + sum(
-        limit is not None for one in memory.responses for limit in (one.at_most, one.at_least)
-    )
+    lost = Answer(None, None, 0.0)
+    objectives = _objectives(memory.responses, lost).size
+    limits = _violation(memory.responses, lost).size
 
     class _Problem(problems.ElementwiseProblem):  # type: ignore[misc, name-defined]
         def __init__(self) -> None:

@@ -7,7 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from rig.study.errors import StudyError
+from rig.study.plots import save
 from rig.study.search import Evaluation, Found
+
+FEWEST_DRAWN = 3
+"""Feasible evaluations that make a picture: principal components of fewer are a line."""
 
 
 def plot_search(path: Path, found: Found) -> None:
@@ -15,9 +19,10 @@ def plot_search(path: Path, found: Found) -> None:
     from matplotlib.figure import Figure
 
     feasible = [one for one in found.memory.evaluations if one.feasible]
-    if len(feasible) < 3:
+    if len(feasible) < FEWEST_DRAWN:
         raise StudyError(
-            f"{len(feasible)} evaluations kept all limits; a picture of the search needs three."
+            f"{len(feasible)} evaluations kept all limits; a picture of the search needs "
+            f"{FEWEST_DRAWN}."
         )
     factors = found.memory.space.factors
     names = [f.name for f in factors] + [r.name for r in found.memory.responses]
@@ -56,10 +61,7 @@ def plot_search(path: Path, found: Found) -> None:
     else:
         last.plot(np.minimum.accumulate(values))
         last.set(xlabel="feasible evaluation", ylabel="best so far", title="progress")
-    try:
-        figure.savefig(path)
-    except (OSError, ValueError) as error:
-        raise StudyError(f"the plot cannot be written to {path}: {error}.") from None
+    save(figure, path)
 
 
 def _row(one: Evaluation, found: Found) -> list[float]:

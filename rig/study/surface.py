@@ -58,11 +58,8 @@ class Diagnostics:
 
     fitted: Array
     residual: Array
-    leverage: Array
     studentised: Array
     """Externally studentised residuals; not a number at leverage 1."""
-    cook: Array
-    """Cook's distances."""
     normality: float | None
     """p of the Shapiro-Wilk test; small where residuals are not normal. None of fewer than four
     residuals that differ."""
@@ -185,7 +182,6 @@ def fit_surface(
     with np.errstate(divide="ignore", invalid="ignore"):
         press = float(np.sum((fitted.resid / (1 - influence.hat_matrix_diag)) ** 2))
         studentised = np.asarray(influence.resid_studentized_external)
-        cook = np.asarray(influence.cooks_distance[0])
     precision = float(np.ptp(predictions)) / np.sqrt(p * variance / n) if variance else np.inf
     error_rows, remark = _error_sources(x, values, fitted)
     return Surface(
@@ -216,15 +212,15 @@ def fit_surface(
         diagnostics=Diagnostics(
             fitted=predictions,
             residual=np.asarray(fitted.resid),
-            leverage=np.asarray(influence.hat_matrix_diag),
             studentised=studentised,
-            cook=cook,
             normality=_normality(np.asarray(fitted.resid)),
         ),
     )
 
 
 def _check(response: str, values: Array) -> None:
+    if not values.size:
+        raise StudyError(f"response '{response}': no run has a value.")
     wrong = np.flatnonzero(~np.isfinite(values))
     if wrong.size:
         raise StudyError(

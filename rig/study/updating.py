@@ -15,22 +15,24 @@ Uncertainties of different pressures are taken for independent.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.mechanics.beam import BeamTheory, published_free_parameter
 from rig.mechanics.bellow import bending_geometry
 from rig.mechanics.blocked import blocked_force
 from rig.mechanics.table import GRAM_FORCE
-from rig.spec.actuator import ActuatorSpec
+from rig.spec.actuator import ActuatorSpec, BellowBendingGeometry
 from rig.spec.material import MaterialSpec
+from rig.spec.workspace import Setup
 from rig.study.errors import StudyError
 from rig.study.factors import Array
+from rig.study.summary import read_experiments
 
 NAMES = ("modulus", "wall", "free_parameter", "stiffening", "offset")
 REPORTED = (*NAMES, "effective_modulus")
@@ -163,8 +165,11 @@ class Update:
 class Forward:
     """The model of an actuator; parameters come in prior deviations from the prior, (5,)."""
 
-    actuator: ActuatorSpec
-    material: MaterialSpec
+    geometry: BellowBendingGeometry
+    prior_modulus: float
+    """In Pa."""
+    top_pressure: float
+    """Limit of the actuator, in Pa."""
     priors: Priors
     force_slope: Callable[[float], float]
     """Wall in m to blocked force per pascal in N."""
@@ -183,18 +188,23 @@ class Forward:
             for w in walls.tolist()
         ]
         curve = PchipInterpolator(walls, slopes)
-        return cls(actuator, material, priors, lambda wall: float(curve(wall)))
+        return cls(
+            geometry,
+            material.young_modulus.value,
+            actuator.limits.pressure,
+            priors,
+            lambda wall: float(curve(wall)),
+        )
 
     def parameters(self, unit: Array) -> dict[str, float]:
         """Physical values, SI."""
-        geometry = bending_geometry(self.actuator, "Model updating")
-        modulus = self.material.young_modulus.value * (1 + self.priors.modulus * unit[0])
-        free = published_free_parameter(geometry, modulus) * (
+        modulus = self.prior_modulus * (1 + self.priors.modulus * unit[0])
+        free = published_free_parameter(self.geometry, modulus) * (
             1 + self.priors.free_parameter * unit[2]
         )
         return {
             "modulus": modulus,
-            "wall": geometry.wall_thickness * (1 + self.priors.wall * unit[1]),
+            "wall": self.geometry.wall_thickness * (1 + self.priors.wall * unit[1]),
             "free_parameter": free,
             "stiffening": self.priors.stiffening * unit[3],
             "offset": self.priors.offset * unit[4],
@@ -204,12 +214,11 @@ class Forward:
     def answers(self, unit: Array, at: Measured) -> tuple[Array, Array]:
         """Angles in rad and forces in N at the levels of `at`."""
         p = self.parameters(unit)
-        geometry = bending_geometry(self.actuator, "Model updating")
-        printed = geometry.model_copy(update={"wall_thickness": p["wall"]})
+        printed = self.geometry.model_copy(update={"wall_thickness": p["wall"]})
         linear = BeamTheory(printed, p["modulus"], p["free_parameter"]).angle(at.angle_pressure)
         slope = self.force_slope(p["wall"])
         force = slope * at.force_pressure
-        limit = slope * self.actuator.limits.pressure
+        limit = slope * self.top_pressure
         return (
             p["offset"] + linear / (1 + p["stiffening"] * linear / (np.pi / 2)),
             force / (1 + p["stiffening"] * force / limit),
@@ -252,7 +261,7 @@ def update_model(
         best, covariance = _fitted(forward, run)
     if mcmc:
         draws = _sampled(forward, run, best, covariance, mcmc, seed)
-        best, covariance = draws.mean(axis=0), np.cov(draws.T)
+        best = draws.mean(axis=0)
     else:
         rng = np.random.default_rng(seed)
         draws = np.clip(rng.multivariate_normal(best, covariance, size=500), -_REACH, _REACH)
@@ -328,18 +337,11 @@ def _sampled(
 
 def read_measured(run: Path) -> Measured:
     """Levels of a run's summary, both branches; raises StudyError where there are none."""
-    path = run / "summary.json"
-    try:
-        experiments = json.loads(path.read_text(encoding="utf-8"))["experiments"]
-    except (OSError, ValueError, KeyError):
-        raise StudyError(
-            f"{path} is not there, or is no summary; expected the folder of a recorded run. "
-            f"`rig report {run}` writes its summary again."
-        ) from None
+    experiments = read_experiments(run)
     angle = _levels(experiments.get("deformation"), float(np.radians(1.0)))
     force = _levels(experiments.get("blocked_force"), GRAM_FORCE)
     if angle[0].size + force[0].size == 0:
-        raise StudyError(f"{path}: the run measured neither angle nor blocked force.")
+        raise StudyError(f"{run}: the run measured neither angle nor blocked force.")
     return Measured(*angle, *force)
 
 
@@ -355,12 +357,16 @@ def _levels(experiment: Mapping[str, Any] | None, factor: float) -> tuple[Array,
 
 
 def without_pressures(run: Measured, held_out: Array) -> tuple[Measured, Measured]:
-    """The run without levels within 0.2 kPa of the pressures in Pa, and those levels alone."""
+    """The run without levels within 0.2 kPa of the pressures in Pa, and those levels alone.
 
-    def near(pressure: Array) -> Array:
-        return np.asarray(np.any(np.abs(pressure[:, None] - held_out[None, :]) < 200.0, axis=1))
+    Raises StudyError for pressures at which the run has no level.
+    """
 
-    def only(angles: Array, forces: Array) -> Measured:
+    def near(pressure: Array) -> NDArray[np.bool_]:
+        """Levels (rows) against pressures to hold out (columns)."""
+        return np.asarray(np.abs(pressure[:, None] - held_out[None, :]) < 200.0)
+
+    def only(angles: NDArray[np.bool_], forces: NDArray[np.bool_]) -> Measured:
         return replace(
             run,
             angle_pressure=run.angle_pressure[angles],
@@ -371,7 +377,26 @@ def without_pressures(run: Measured, held_out: Array) -> tuple[Measured, Measure
             force_u=run.force_u[forces],
         )
 
-    angles, forces = near(run.angle_pressure), near(run.force_pressure)
-    if not angles.any() and not forces.any():
-        raise StudyError("no level of the run lies at the pressures to hold out.")
-    return only(~angles.astype(bool), ~forces.astype(bool)), only(angles, forces)
+    of_angle, of_force = near(run.angle_pressure), near(run.force_pressure)
+    missed = held_out[~(of_angle.any(axis=0) | of_force.any(axis=0))]
+    if missed.size:
+        raise StudyError(
+            f"no level of the run lies at {', '.join(f'{p / 1e3:g}' for p in missed)} kPa, which "
+            f"you want to hold out."
+        )
+    angles, forces = np.any(of_angle, axis=1), np.any(of_force, axis=1)
+    return only(~angles, ~forces), only(angles, forces)
+
+
+def require_same_actuator(one: Setup, other: Setup) -> None:
+    """Raise StudyError where two runs are of actuators of different geometry or material."""
+    for what, own, others in (
+        ("geometry", one.actuator.geometry, other.actuator.geometry),
+        ("material", one.material, other.material),
+    ):
+        if own != others:
+            raise StudyError(
+                f"the run to be foretold is of another {what} ({other.actuator.name} of "
+                f"{other.material.name}, not {one.actuator.name} of {one.material.name}); expected "
+                f"a run of the same actuator."
+            )

@@ -30,11 +30,18 @@ def test_a_study_runs_and_is_known_the_second_time(rig: Command, tmp_path: Path)
     assert told["computed"] == 9
     assert told["responses"]["angle"]["r2"] > 0.99
     assert told["optimum"]["factors"]["wall"] < 1.3
+    assert told["optimum"]["on_bounds"] == ["wall", "modulus"]
+    manifest = json.loads((out / "manifest.json").read_text())
+    assert manifest["executor"] == "here"
+    assert "workers" not in manifest
+    assert "threads" not in manifest
     for name in ("results.parquet", "manifest.json", "angle-surface.png", "angle-residuals.png"):
         assert (out / name).is_file()
     again = rig("study", file, "--out", out, "--executor", "here", "--no-plots")
     assert "0 computed, 9 known before" in again.out
     assert "stationary point" in again.out
+    assert "wall is at a level" in again.out
+    assert "Shapiro-Wilk" in again.out
 
 
 def test_a_dry_run_shows_the_points_and_writes_nothing(rig: Command, tmp_path: Path) -> None:

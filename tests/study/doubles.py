@@ -42,6 +42,11 @@ def dying_at_once(task: tuple[int, str]) -> int:
 
 def slowly(task: Task) -> dict[str, float]:
     time.sleep(0.2)
+    return walls(task)
+
+
+def walls(task: Task) -> dict[str, float]:
+    """The square of the wall in mm, whatever is asked."""
     wall = task.actuator.geometry.wall_thickness * 1e3
     return {response.name: wall**2 for response in task.responses}
 
@@ -52,3 +57,9 @@ def spinning(count: int) -> int:
     for i in range(count):
         total += i * i % 7
     return total
+
+
+def interrupted(task: int) -> int:
+    """As a terminal does at Ctrl-C, which signals workers and their parent alike."""
+    os.kill(os.getpid(), signal.SIGINT)
+    return task

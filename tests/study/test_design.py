@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from pydantic import ValidationError
@@ -103,3 +105,13 @@ def test_inconsistent_studies_are_refused(change: dict[str, object], words: str)
     StudySpec.model_validate(BASE)
     with pytest.raises(ValidationError, match=words):
         StudySpec.model_validate({**BASE, **change})
+
+
+def test_a_sobol_sequence_of_any_count_is_scipys_without_its_warning() -> None:
+    from scipy.stats import qmc
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        points = coded_points(SpaceFillingDesign(kind="sobol", points=5, seed=3), 2)
+    expected = 2 * qmc.Sobol(2, rng=np.random.default_rng(3)).random(8)[:5] - 1
+    assert points == pytest.approx(expected)

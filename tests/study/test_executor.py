@@ -36,6 +36,8 @@ def test_errors_and_defects_cost_their_own_point(executor: Executor) -> None:
     (broken,) = executor.map(doubles.breaking, [0])
     assert broken.error is not None
     assert broken.error.startswith("defect: ZeroDivisionError")
+    assert not broken.lasting
+    assert outcomes[1].lasting
 
 
 def test_a_worker_that_dies_costs_one_point(tmp_path: Path) -> None:
@@ -43,10 +45,16 @@ def test_a_worker_that_dies_costs_one_point(tmp_path: Path) -> None:
     outcomes = sorted(LocalProcesses(2).map(doubles.dying_at_once, tasks), key=lambda o: o.index)
     assert [o.value for o in outcomes] == [0, 1, 2, 3, None, 5]
     assert outcomes[4].crashed
+    assert not outcomes[4].lasting
     assert outcomes[4].error is not None
     assert "-9" in outcomes[4].error
     tried = {n: (tmp_path / f"tried-{n}").stat().st_size for n in range(6)}
     assert tried == {0: 1, 1: 1, 2: 2, 3: 1, 4: 2, 5: 1}
+
+
+def test_an_interrupt_of_the_terminal_is_left_to_the_parent() -> None:
+    (outcome,) = LocalProcesses(1).map(doubles.interrupted, [7])
+    assert (outcome.value, outcome.error) == (7, None)
 
 
 def test_workers_have_the_threads_that_were_asked_for() -> None:
@@ -66,7 +74,7 @@ def test_a_missing_extra_is_named() -> None:
 
 
 @pytest.mark.slow
-def test_two_processes_are_nearly_twice_as_fast() -> None:
+def test_work_is_spread_over_two_processes() -> None:
     """Prints the ratio; asserts only that work is spread, as other load is not ours to know."""
     tasks = [6_000_000] * 16
     began = time.perf_counter()

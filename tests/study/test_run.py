@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -17,9 +18,10 @@ import doubles
 from rig.errors import RigError
 from rig.spec.workspace import Workspace, library_root
 from rig.study.analysis import analyse
+from rig.study.errors import StudyError
 from rig.study.executor import InProcess
-from rig.study.plan import Plan, make_plan
-from rig.study.results import MANIFEST, RESULTS, Folder
+from rig.study.plan import Plan, Task, make_plan
+from rig.study.results import MANIFEST, RESULTS, Folder, write_whole
 from rig.study.run import Standing, run_study
 
 LIBRARY = Workspace(library_root(), is_library=True)
@@ -144,6 +146,70 @@ def test_the_analysis_finds_the_best_point_within_limits(tmp_path: Path) -> None
     assert analysis.best.actual[0] == pytest.approx(1.2, abs=0.05)
     assert analysis.best.limited[0] <= 14.5 * (1 + 1e-6)
     assert any("no pure error" in remark for remark in analysis.remarks)
+
+
+def test_a_study_without_any_answer_is_analysed_to_that(tmp_path: Path) -> None:
+    def refusing(_: Task) -> Mapping[str, float]:
+        raise StudyError("not today")
+
+    study = run_study(plan_of(tmp_path), Folder(tmp_path / "out"), InProcess(), function=refusing)
+    assert study is not None
+    analysis = analyse(study)
+    assert analysis.surfaces == {}
+    assert "angle has no surface: response 'angle': no run has a value." in analysis.remarks
+
+
+def test_there_is_no_optimum_under_a_limit_that_cannot_be_judged(tmp_path: Path) -> None:
+    """The volume is the same everywhere, so that it has no surface; and it breaks its limit."""
+
+    def constant_volume(task: Task) -> Mapping[str, float]:
+        wall, modulus = task.actuator.geometry.wall_thickness, task.material.young_modulus.value
+        return {"angle": 1e3 * wall + (modulus / 450e3) ** 2, "volume": 15.0}
+
+    study = run_study(
+        plan_of(tmp_path), Folder(tmp_path / "out"), InProcess(), function=constant_volume
+    )
+    assert study is not None
+    analysis = analyse(study)
+    assert set(analysis.surfaces) == {"angle"}
+    assert analysis.best is None
+    assert any("limit on 'volume' cannot be judged" in remark for remark in analysis.remarks)
+
+
+def test_a_defect_is_tried_again_the_next_time(tmp_path: Path) -> None:
+    plan, folder = plan_of(tmp_path), Folder(tmp_path / "out")
+
+    def starving(task: Task) -> Mapping[str, float]:
+        if task.name == "03":
+            raise MemoryError
+        return doubles.walls(task)
+
+    first = run_study(plan, folder, InProcess(), function=starving)
+    assert first is not None
+    assert [point.name for point, _ in first.failed] == ["03"]
+    second = run_study(plan, folder, InProcess(), function=doubles.walls)
+    assert second is not None
+    assert (second.computed, second.failed) == (1, ())
+
+
+def test_results_are_readable_as_other_files_are_and_leave_nothing_half(tmp_path: Path) -> None:
+    plain = tmp_path / "plain"
+    plain.touch()
+    write_whole(tmp_path / "out" / "a.json", b"{}")
+    assert (tmp_path / "out" / "a.json").stat().st_mode == plain.stat().st_mode
+    (tmp_path / "out" / "b.json").mkdir()
+    with pytest.raises(StudyError, match=r"b\.json"):
+        write_whole(tmp_path / "out" / "b.json", b"{}")
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a.json", "b.json"]
+
+
+def test_unbalanced_sobol_points_are_remarked(tmp_path: Path) -> None:
+    text = STUDY.replace("{kind: box-behnken, centre_points: 3}", "{kind: sobol, points: 12}")
+    study = run_study(
+        plan_of(tmp_path, text), Folder(tmp_path / "out"), InProcess(), function=doubles.walls
+    )
+    assert study is not None
+    assert any("a power of two, as 16" in remark for remark in analyse(study).remarks)
 
 
 def test_responses_of_recorded_runs_are_read_and_missed_ones_are_told_of(tmp_path: Path) -> None:

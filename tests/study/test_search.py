@@ -12,7 +12,9 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 from test_run import LIBRARY
 
-from rig.spec.loading import load_actuator, parse
+from rig.spec.actuator import ActuatorSpec
+from rig.spec.errors import SpecError
+from rig.spec.loading import load_actuator, parse, read
 from rig.spec.optimisation import OptimisationSpec
 from rig.study.errors import StudyError
 from rig.study.plan import Task, make_space
@@ -130,9 +132,42 @@ def test_the_best_is_written_as_a_spec_and_drawn(tmp_path: Path) -> None:
     assert (tmp_path / "search.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_several_objectives_need_the_search_for_fronts() -> None:
-    from rig.spec.errors import SpecError
+def test_a_defect_is_not_remembered_beyond_the_search(tmp_path: Path) -> None:
+    def starving(_: Task) -> Mapping[str, float]:
+        raise MemoryError
 
+    assert run([BOWL], "bayesian", tmp_path, starving).best == ()
+    assert run([BOWL], "bayesian", tmp_path).best
+
+
+def test_a_spec_is_written_with_its_material_if_that_was_called_by_a_path(tmp_path: Path) -> None:
+    """`./mine.yaml` beside the drawing is nothing beside the written spec."""
+    shipped = LIBRARY.path("actuator", "bellow-bending").read_text()
+    assert "material: agilus30\n" in shipped
+    drawing = tmp_path / "drawing.yaml"
+    drawing.write_text(shipped.replace("material: agilus30\n", "material: ./mine.yaml\n"))
+    material = LIBRARY.path("material", "agilus30").read_text()
+    (tmp_path / "mine.yaml").write_text(material)
+    text = f"{HEAD}responses: [{BOWL}]\nsearch: {SEARCHES['cobyla']}\n"
+    spec = parse(text, Path("small.yaml"), OptimisationSpec).spec
+    space = make_space(tmp_path / "s.yaml", LIBRARY, str(drawing), spec.factors, spec.responses)
+    task = space.point("1", [1.5e-3, 6e-3]).task
+    assert task is not None
+    write_specs(tmp_path / "out", "best-1", task, space)
+    written = tmp_path / "out" / "best-1.yaml"
+    resolved = LIBRARY.resolve_actuator(read(written, ActuatorSpec))
+    assert resolved.path == tmp_path / "out" / "best-1-material.yaml"
+    assert resolved.spec == space.material
+
+
+def test_two_factors_of_one_field_are_refused() -> None:
+    twice = HEAD.replace("average_radius", "wall_thickness")
+    text = f"{twice}responses: [{BOWL}]\nsearch: {SEARCHES['cobyla']}\n"
+    with pytest.raises(SpecError, match="different fields"):
+        parse(text, Path("small.yaml"), OptimisationSpec)
+
+
+def test_several_objectives_need_the_search_for_fronts() -> None:
     other = "{name: w, quantity: volume, model: beam, pressure: 4 kPa, goal: minimise}"
     with pytest.raises(SpecError, match="nsga2"):
         run([BOWL, other], "cobyla")

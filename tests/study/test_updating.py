@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from rig.study.updating import (
     Priors,
     Update,
     read_measured,
+    require_same_actuator,
     update_model,
     without_pressures,
 )
@@ -126,7 +128,7 @@ def test_a_run_is_read_from_its_summary_and_levels_can_be_held_out(tmp_path: Pat
     points = [
         {"measured_pressure_kpa": p, "mean": 10.0 * p, "u95": 0.4} for p in (0.0, 2.0, 4.0, 6.0)
     ]
-    summary = {"experiments": {"deformation": {"points": points}}}
+    summary = {"status": "success", "experiments": {"deformation": {"points": points}}}
     (tmp_path / "summary.json").write_text(json.dumps(summary))
     run = read_measured(tmp_path)
     assert run.angle_pressure == pytest.approx([0, 2e3, 4e3, 6e3])
@@ -136,6 +138,8 @@ def test_a_run_is_read_from_its_summary_and_levels_can_be_held_out(tmp_path: Pat
     assert left.angle_pressure == pytest.approx([4e3])
     with pytest.raises(StudyError, match="hold out"):
         without_pressures(run, np.array([5e3]))
+    with pytest.raises(StudyError, match="at 70 kPa, which you want to hold out"):
+        without_pressures(run, np.array([4e3, 70e3]))
     with pytest.raises(StudyError, match="4 levels"):
         update_model(ACTUATOR, MATERIAL, run)
     with pytest.raises(StudyError, match="recorded run"):
@@ -145,3 +149,23 @@ def test_a_run_is_read_from_its_summary_and_levels_can_be_held_out(tmp_path: Pat
 def test_priors_must_be_wider_than_nothing() -> None:
     with pytest.raises(StudyError, match="above 0"):
         Priors(wall=0.0)
+
+
+def test_a_run_that_did_not_end_well_is_refused(tmp_path: Path) -> None:
+    point = {"measured_pressure_kpa": 2.0, "mean": 20.0, "u95": 0.4}
+    summary = {"status": "aborted", "experiments": {"deformation": {"points": [point]}}}
+    (tmp_path / "summary.json").write_text(json.dumps(summary))
+    with pytest.raises(StudyError, match="'aborted'"):
+        read_measured(tmp_path)
+
+
+def test_only_a_run_of_the_same_actuator_can_be_foretold() -> None:
+    own = LIBRARY.setup("bellow-bending", "virtual-beam")
+    require_same_actuator(own, LIBRARY.setup("bellow-bending", "virtual-beam"))
+    thicker = own.actuator.geometry.model_copy(update={"wall_thickness": 2e-3})
+    other = replace(own, actuator=own.actuator.model_copy(update={"geometry": thicker}))
+    with pytest.raises(StudyError, match="another geometry"):
+        require_same_actuator(own, other)
+    softer = own.material.model_copy(update={"name": "softer"})
+    with pytest.raises(StudyError, match="another material"):
+        require_same_actuator(own, replace(own, material=softer))
