@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import StrEnum
+from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from rig.fitting.fit import EnergyFit
-    from rig.fitting.prepare import Prepared
     from rig.fitting.prony import PronyFit
     from rig.fitting.ranking import Candidate, Ranking
     from rig.fitting.specimen import Specimen
@@ -130,12 +130,15 @@ def fit_material(
         mass_density = to_si(density or "1070 kg/m**3", "kg/m**3")
     except ValueError as error:
         raise typer.BadParameter(f"--density: {error}") from None
+    if stable_to is not None and not 1 < stable_to < inf:
+        raise typer.BadParameter(f"--stable-to {stable_to:g}: expected a stretch above 1")
+    strains = _strains(modulus_at)
     specimens = _read(data or [], biaxial or [], planar or [], measures)
     prepared = prepare(
         specimens,
         Preparation(_region(region), keep_outliers, average),
     )
-    longest = stable_to or max(s.longest for s in prepared.tested)
+    longest = max(s.longest for s in prepared.tested) if stable_to is None else stable_to
     settings = Settings(Weighting(weighting.value), seed=seed, stable_to=longest)
     ranking = fit_all(chosen, prepared.fitted, settings)
     if not ranking.candidates:
@@ -145,7 +148,8 @@ def fit_material(
         )
     best = _chosen(ranking, choose)
     fading = None if relaxation is None else fit_prony(read_relaxation(relaxation), prony_terms)
-    moduli = _moduli(prepared.tested, best.fit, modulus_at)
+    moduli = _moduli(prepared.tested, best.fit, strains)
+    notes = [*prepared.notes, *_unreached(strains, moduli)]
     if out is not None:
         about = Provenance(
             name or next((s.material for s in specimens if s.material), specimens[0].name),
@@ -163,10 +167,10 @@ def fit_material(
         title = name or specimens[0].material or specimens[0].name
         plot_fits(plot, title, prepared.fitted, [c.fit for c in ranking.candidates[:4]])
     if as_json:
-        typer.echo(_as_json(prepared, ranking, best, fading, moduli))
+        typer.echo(_as_json(notes, ranking, best, fading, moduli))
         return
     console = Console()
-    for note in prepared.notes:
+    for note in notes:
         console.print(f"note: {note}", soft_wrap=True, markup=False)
     console.print(_table(ranking))
     for family, why in ranking.failures.items():
@@ -237,20 +241,36 @@ Moduli = list[tuple[str, float, float, float]]
 """Specimen, strain, equivalent modulus in Pa of the data and of the fitted energy."""
 
 
-def _moduli(specimens: tuple[Specimen, ...], found: EnergyFit, text: str) -> Moduli:
+def _strains(text: str) -> list[float]:
+    """`5,50` in % as plain numbers."""
+    try:
+        strains = [float(part) / 100 for part in text.split(",") if part.strip()]
+    except ValueError:
+        strains = [0.0]
+    if not all(isfinite(strain) and strain != 0 for strain in strains):
+        raise typer.BadParameter(f"--modulus-at '{text}': expected percents other than 0, as 5,50")
+    return strains
+
+
+def _moduli(specimens: tuple[Specimen, ...], found: EnergyFit, strains: list[float]) -> Moduli:
     """At all strains that a uniaxial specimen reaches."""
     from rig.fitting.specimen import secant_modulus
     from rig.mechanics.hyperelastic import Mode
 
-    try:
-        strains = [float(part) / 100 for part in text.split(",") if part.strip()]
-    except ValueError:
-        raise typer.BadParameter(f"--modulus-at '{text}': expected percents, as 5,50") from None
     return [
         (s.name, strain, secant_modulus(s, strain), found.secant_modulus(strain))
         for s in specimens
         for strain in strains
-        if s.mode is Mode.UNIAXIAL and s.stretch[0] - 1 <= strain <= s.longest - 1 and strain != 0
+        if s.mode is Mode.UNIAXIAL and s.stretch[0] - 1 <= strain <= s.longest - 1
+    ]
+
+
+def _unreached(strains: list[float], moduli: Moduli) -> list[str]:
+    reached = {strain for _, strain, _, _ in moduli}
+    return [
+        f"no uniaxial specimen has a strain of {100 * strain:g} %: no equivalent modulus there."
+        for strain in strains
+        if strain not in reached
     ]
 
 
@@ -303,7 +323,7 @@ def _left_out(candidate: Candidate) -> str:
 def _best_lines(best: Candidate) -> list[str]:
     found = best.fit
     validation = best.validation
-    lines = [f"{found.family.name}, stable to a stretch of {found.stable_to:.4g}:"]
+    lines = [f"{found.family.name}, {found.stability}:"]
     for i, c in enumerate(found.coefficients):
         factor, unit = (1e-3, " kPa") if c.is_modulus else (1.0, "")
         error = "not determined" if c.standard_error is None else f"{c.standard_error * factor:.2g}"
@@ -363,7 +383,7 @@ def _fading_lines(fading: PronyFit | None) -> list[str]:
 
 
 def _as_json(
-    prepared: Prepared,
+    notes: list[str],
     ranking: Ranking,
     best: Candidate,
     fading: PronyFit | None,
@@ -373,7 +393,7 @@ def _as_json(
     from dataclasses import asdict
 
     content = {
-        "notes": prepared.notes,
+        "notes": notes,
         "best": best.fit.family.name,
         "fits": [_plain(candidate) for candidate in ranking.candidates],
         "failures": ranking.failures,

@@ -11,8 +11,10 @@ import typer
 from rig.cli.app import app
 
 if TYPE_CHECKING:
-    from rig.study.plan import Plan
+    from rig.spec.workspace import Workspace
+    from rig.study.factors import Factor
     from rig.study.sensitivity import Model
+    from rig.study.surface import Surface
 
 
 class Method(StrEnum):
@@ -52,49 +54,46 @@ def sensitivity(
     import json
 
     from rig.spec.workspace import Workspace
-    from rig.study.plan import make_plan
+    from rig.study.model import beam_model, surface_model
+    from rig.study.plan import read_study
 
     workspace = Workspace.find()
-    plan = make_plan(workspace.path("study", file), workspace)
-    names = [one.name for one in plan.spec.responses]
-    wanted = response or names[0]
-    if wanted not in names:
-        raise typer.BadParameter(f"'{wanted}' is no response of it; expected {', '.join(names)}")
-    model = _surface(plan, study, wanted) if study is not None else _beam(plan, wanted)
-    found = _computed(method, model, plan, samples, seed)
+    path = workspace.path("study", file)
+    _, space = read_study(path, workspace)
+    responses = {one.name: one for one in space.responses}
+    wanted = response or next(iter(responses))
+    if wanted not in responses:
+        raise typer.BadParameter(
+            f"'{wanted}' is no response of it; expected {', '.join(responses)}"
+        )
+    if study is None:
+        model = beam_model(space, responses[wanted])
+    else:
+        model = surface_model(_surface(path, workspace, study, wanted), space)
+    found = _computed(method, model, space.factors, samples, seed)
     if as_json:
         typer.echo(json.dumps({"response": wanted, "method": method.value, **found}, indent=2))
         return
     _show(wanted, found)
 
 
-def _beam(plan: Plan, response: str) -> Model:
-    from rig.study.model import beam_model
-
-    return beam_model(plan, response)
-
-
-def _surface(plan: Plan, folder: Path, response: str) -> Model:
-    from rig.study.analysis import analyse
-    from rig.study.errors import StudyError
-    from rig.study.model import surface_model
+def _surface(path: Path, workspace: Workspace, folder: Path, response: str) -> Surface:
+    from rig.study.analysis import surface_of
+    from rig.study.plan import make_plan
     from rig.study.results import Folder
     from rig.study.run import known_study
 
-    finished = known_study(plan, Folder(folder))
-    if finished is None:
-        raise StudyError(f"the study in {folder} is not finished; run `rig study` first.")
-    return surface_model(analyse(finished), plan.factors, response)
+    return surface_of(known_study(make_plan(path, workspace), Folder(folder)), response)
 
 
 def _computed(
-    method: Method, model: Model, plan: Plan, samples: int | None, seed: int
+    method: Method, model: Model, factors: tuple[Factor, ...], samples: int | None, seed: int
 ) -> dict[str, Any]:
     from rig.study.sensitivity import morris_screening, sobol_indices, tolerance
 
     match method:
         case Method.SOBOL:
-            sobol = sobol_indices(model, plan.factors, samples or 2**14, seed)
+            sobol = sobol_indices(model, factors, samples or 2**14, seed)
             return {
                 "evaluations": sobol.evaluations,
                 "factors": {
@@ -114,7 +113,7 @@ def _computed(
                 },
             }
         case Method.MORRIS:
-            morris = morris_screening(model, plan.factors, samples or 50, seed)
+            morris = morris_screening(model, factors, samples or 50, seed)
             return {
                 "evaluations": morris.evaluations,
                 "factors": {
@@ -125,7 +124,7 @@ def _computed(
                 },
             }
         case Method.TOLERANCE:
-            found = tolerance(model, plan.factors, samples or 100_000, seed)
+            found = tolerance(model, factors, samples or 100_000, seed)
             return {
                 "evaluations": found.values.size + found.lost,
                 "lost": found.lost,

@@ -83,6 +83,12 @@ class EnergyFit:
     """Whether a condition of stability is active: the data alone would have chosen otherwise."""
 
     @property
+    def stability(self) -> str:
+        """What the check of Drucker's stability came to, in words."""
+        found = "stable" if self.stable else "not stable everywhere"
+        return f"{found} (Drucker) to a stretch of {self.stable_to:.4g}"
+
+    @property
     def values(self) -> dict[str, float]:
         """Coefficient to value."""
         return {c.name: c.value for c in self.coefficients}
@@ -180,7 +186,9 @@ def fit(
             f"{family.name}: {problem.data.size} points cannot determine {unknowns} coefficients; "
             f"expected more points than coefficients."
         )
-    longest = settings.stable_to or max(float(np.max(s.stretch)) for s in specimens)
+    longest = settings.stable_to
+    if longest is None:
+        longest = max(float(np.max(s.stretch)) for s in specimens)
     shortest = min(float(np.min(s.stretch)) for s in specimens)
     highest = max(longest, 1 / shortest, 1 + 1e-6)
     if family.positive:

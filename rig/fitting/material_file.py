@@ -8,12 +8,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from rig import __version__
+from rig.fitting.errors import FittingError
 from rig.fitting.fit import EnergyFit
 from rig.fitting.prony import PronyFit
 from rig.fitting.specimen import Specimen
-from rig.mechanics.hyperelastic import shear_modulus_at_rest
+from rig.mechanics.hyperelastic import Mode, shear_modulus_at_rest
+from rig.spec.explain import first_problem
 from rig.spec.material import MaterialSpec
 
 _DIGITS = 6
@@ -40,10 +43,17 @@ def material_text(
     """YAML of kind `material`; `tested` are whole specimens, `fitted` what was left for the fit.
 
     Validated before it is returned. Strength and elongation at break are the range of the
-    specimens' largest stress and strain in uniaxial tension.
+    specimens' largest stress and strain in uniaxial tension. Raises FittingError where the numbers
+    make no material.
     """
     data = _content(found, tested, fitted, about)
-    MaterialSpec.model_validate(data)
+    try:
+        MaterialSpec.model_validate(data)
+    except ValidationError as error:
+        raise FittingError(
+            f"the fit makes no material file: {first_problem(error)}. Correct what it is made of, "
+            f"or choose another energy."
+        ) from None
     from ruamel.yaml import YAML
 
     yaml = YAML()
@@ -58,12 +68,13 @@ def _content(
     found: EnergyFit, tested: Sequence[Specimen], fitted: Sequence[Specimen], about: Provenance
 ) -> dict[str, Any]:
     files = ", ".join(dict.fromkeys(s.source for s in tested))
-    strain = max(s.longest for s in fitted) - 1
+    low = min(float(s.stretch[0]) for s in fitted) - 1
+    high = max(s.longest for s in fitted) - 1
     modes = " and ".join(dict.fromkeys(str(s.mode) for s in fitted))
     source = (
-        f"rig {__version__}, least squares fit of {found.family.name} to {modes} tests up to a "
-        f"strain of {strain:.4g} ({files}; {len(fitted)} curves, {found.points} points); RMSE "
-        f"{found.rmse / 1e3:.4g} kPa; stable (Drucker) to a stretch of {found.stable_to:.4g}"
+        f"rig {__version__}, least squares fit of {found.family.name} to {modes} tests at strains "
+        f"from {low:.4g} to {high:.4g} ({files}; {len(fitted)} curves, {found.points} points); "
+        f"RMSE {found.rmse / 1e3:.4g} kPa; {found.stability}"
     )
     young = 2 * (1 + about.poisson_ratio) * shear_modulus_at_rest(found.energy)
     content: dict[str, Any] = {
@@ -77,7 +88,9 @@ def _content(
         "poisson_ratio": {"value": about.poisson_ratio, "source": about.poisson_source},
         "density": {"value": f"{about.density:g} kg/m**3", "source": about.density_source},
     }
-    pulled = [s for s in tested if s.mode == "uniaxial"]
+    pulled = [
+        s for s in tested if s.mode is Mode.UNIAXIAL and s.longest > 1 and np.max(s.stress) > 0
+    ]
     if pulled:
         strengths = [float(np.max(s.stress)) for s in pulled]
         breaks = [s.longest - 1 for s in pulled]

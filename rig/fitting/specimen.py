@@ -24,6 +24,10 @@ _VISIBLE = 0.01
 """Of the largest stress: what is less is no outlier."""
 _NEIGHBOURS = 5
 """Points on either side that a point is held against."""
+_SPIKE = 2
+"""Points that a spike may be wide without being taken for the strength."""
+_REWEIGHTED = 20
+"""Rounds of reweighting; a spike's weight is gone after a few."""
 _OUTLYING_SPECIMEN = 3.5
 """Modified z-score of a whole specimen (Iglewicz and Hoaglin, 1993)."""
 _FEWEST_SPECIMENS = 4
@@ -69,8 +73,11 @@ class Specimen:
 
 
 def until_rupture(specimen: Specimen) -> Specimen:
-    """Without what was recorded after the largest stress: there the specimen tears."""
-    last = int(np.argmax(specimen.stress))
+    """Without what was recorded after the largest stress: there the specimen tears.
+
+    The largest stress is looked for near the largest running median, which spikes do not move.
+    """
+    last = _strongest(specimen.stress)
     after = specimen.stretch.size - 1 - last
     if after == 0:
         return specimen
@@ -80,6 +87,16 @@ def until_rupture(specimen: Specimen) -> Specimen:
         f"{specimen.name}: {after} points after the largest stress, at a strain of "
         f"{specimen.stretch[last] - 1:.4g}, were left out as rupture.",
     )
+
+
+def _strongest(stress: Array) -> int:
+    """Index of the largest stress that is no spike."""
+    width = 2 * _SPIKE + 1
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(stress, _SPIKE, mode="edge"), width)
+    middle = np.median(windows, axis=1)
+    near = stress.size - 1 - int(np.argmax(middle[::-1]))
+    first = max(near - _SPIKE, 0)
+    return first + int(np.argmax(stress[first : near + _SPIKE + 1]))
 
 
 def within(specimen: Specimen, low: float, high: float) -> Specimen:
@@ -113,16 +130,18 @@ def thinned(specimen: Specimen, count: int) -> Specimen:
 
 
 def without_outlying_points(specimen: Specimen) -> Specimen:
-    """Without points far from the line through their neighbours, each told of in a note.
+    """Without points far from the parabola through their neighbours, each told of in a note.
 
     Far is six robust standard deviations (1.4826 MAD of all such distances), and at least 1 % of
-    the largest stress: smooth curves bend by more than their noise.
+    the largest stress: smooth curves bend by more than their noise. The first and the last five
+    points have neighbours on one side only, which say too little of a curve, and are kept.
     """
     distance = _distance_from_neighbours(specimen.stretch, specimen.stress)
     spread = 1.4826 * float(np.median(np.abs(distance)))
     odd = np.abs(distance) > max(
         _OUTLYING * spread, _VISIBLE * float(np.max(np.abs(specimen.stress)))
     )
+    odd[:_NEIGHBOURS] = odd[-_NEIGHBOURS:] = False
     if not odd.any():
         return specimen
     places = ", ".join(f"{s - 1:.4g}" for s in specimen.stretch[odd][:5])
@@ -135,18 +154,25 @@ def without_outlying_points(specimen: Specimen) -> Specimen:
 
 
 def _distance_from_neighbours(x: Array, y: Array) -> Array:
-    """Of each point from the robust line (Theil-Sen) through the points around it, (n,)."""
+    """Of each point from the parabola of least absolute deviations through those around it, (n,).
+
+    By iteratively reweighted least squares, for all points at once.
+    """
     count = min(2 * _NEIGHBOURS + 1, x.size)
     first = np.clip(np.arange(x.size) - _NEIGHBOURS, 0, x.size - count)
     around = first[:, None] + np.arange(count)
     own = around == np.arange(x.size)[:, None]
     others = around[~own].reshape(x.size, count - 1)
-    one, two = np.triu_indices(count - 1, 1)
-    run = x[others[:, two]] - x[others[:, one]]
-    rise = y[others[:, two]] - y[others[:, one]]
-    slope = np.median(rise / np.where(run == 0, np.inf, run), axis=1)
-    level = np.median(y[others] - slope[:, None] * x[others], axis=1)
-    return np.asarray(y - slope * x - level)
+    apart = x[others] - x[:, None]
+    reach = np.max(np.abs(apart), axis=1, keepdims=True)
+    powers = (apart / np.where(reach > 0, reach, 1.0))[..., None] ** np.arange(3)
+    weight = np.ones_like(apart)
+    least = max(1e-6 * float(np.max(np.abs(y))), np.finfo(float).tiny)
+    for _ in range(_REWEIGHTED):
+        root = np.sqrt(weight)[..., None]
+        solved = np.linalg.pinv(root * powers) @ (root * y[others][..., None])
+        weight = 1 / np.maximum(np.abs(y[others] - (powers @ solved)[..., 0]), least)
+    return np.asarray(y - solved[:, 0, 0])
 
 
 def without_outlying_specimens(
@@ -179,8 +205,6 @@ def averaged(specimens: Sequence[Specimen], count: int) -> Specimen:
     Raises FittingError where they share no stretches.
     """
     first = specimens[0]
-    if len(specimens) == 1:
-        return first
     grid = _common_stretches(specimens, count)
     stress = np.mean([np.interp(grid, s.stretch, s.stress) for s in specimens], axis=0)
     return Specimen(

@@ -13,7 +13,7 @@ import csv
 import math
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 
@@ -21,11 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.fitting.errors import FittingError, TestDataError
-from rig.fitting.specimen import Specimen
+from rig.fitting.specimen import Array, Specimen
 from rig.mechanics.hyperelastic import Mode
 from rig.spec.quantity import to_si
 
-Array = NDArray[np.float64]
 Row = tuple[int, list[str]]
 """Line number from 1, and the cells."""
 
@@ -140,9 +139,9 @@ def read_specimens(
     contradict each other, and FittingError for too few points.
     """
     table = read_table(path, _ELONGATIONS, _LOADS)
-    notes = []
-    stretch, stress, by_what = _stretch_and_stress(table, measures)
-    notes += _disagreement(table, measures)
+    stretch, by_what = _stretch(table, measures)
+    stress = _nominal_stress(table, measures, stretch)
+    notes = _disagreement(table, stretch)
     wrong = np.flatnonzero(stretch <= 0)
     if wrong.size:
         raise TestDataError(
@@ -161,18 +160,8 @@ def read_specimens(
         x, y, rearranged = _ascending(table, rows, stretch, stress)
         own = [f"{name}: {rearranged}"] if rearranged else []
         found.append(Specimen(name, mode, x, y, path.name, material, tuple(own)))
-    first = found[0]
     whole_file = tuple(f"{path.name}: {note}" for note in notes)
-    found[0] = Specimen(
-        first.name,
-        mode,
-        first.stretch,
-        first.stress,
-        first.source,
-        material,
-        (*whole_file, *first.notes),
-    )
-    return tuple(found)
+    return (replace(found[0], notes=(*whole_file, *found[0].notes)), *found[1:])
 
 
 def read_table(path: Path, *wanted: tuple[str, ...]) -> Table:
@@ -267,9 +256,8 @@ def _factor(path: Path, line: int, cell: str, name: str, unit: str) -> float:
         ) from None
 
 
-def _stretch_and_stress(table: Table, measures: Measures | None) -> tuple[Array, Array, str]:
+def _nominal_stress(table: Table, measures: Measures | None, stretch: Array) -> Array:
     columns = table.columns
-    stretch, by_what = _stretch(table, measures)
     true_first = measures is Measures.TRUE
     order = ("true stress", "stress") if true_first else ("stress", "true stress")
     chosen = next((name for name in (*order, "force") if name in columns), "force")
@@ -280,10 +268,10 @@ def _stretch_and_stress(table: Table, measures: Measures | None) -> tuple[Array,
         )
     values = table.values(chosen)
     if chosen == "stress":
-        return stretch, values, by_what
+        return values
     if chosen == "true stress":
-        return stretch, values / stretch, by_what  # the volume is kept: area shrinks by the stretch
-    return stretch, values / _cross_section(table), by_what
+        return values / stretch  # the volume is kept: area shrinks by the stretch
+    return values / _cross_section(table)
 
 
 def _stretch(table: Table, measures: Measures | None) -> tuple[Array, str]:
@@ -334,11 +322,10 @@ def _cross_section(table: Table) -> float:
     return result
 
 
-def _disagreement(table: Table, measures: Measures | None) -> list[str]:
+def _disagreement(table: Table, stretch: Array) -> list[str]:
     """What to tell of a file whose engineering and true stresses are not those of one test."""
     if not {"stress", "true stress"} <= table.columns.keys():
         return []
-    stretch, _ = _stretch(table, measures)
     nominal, true = table.values("stress"), table.values("true stress")
     slack = 1e-5 * float(np.max(np.abs(true)))
     odd = np.abs(nominal * stretch - true) > _AGREE * np.abs(true) + slack

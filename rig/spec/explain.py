@@ -37,6 +37,13 @@ def problems_of(error: ValidationError, tree: Tree, model: type[BaseModel]) -> l
     return sorted(unique.values(), key=lambda p: (p.line or 0, p.column or 0))
 
 
+def first_problem(error: ValidationError) -> str:
+    """`place: message` of what was found wrong first, for specs that are of no file."""
+    first = error.errors(include_url=False)[0]
+    place = ".".join(str(part) for part in first["loc"])
+    return f"{place}: {first['msg']}" if place else first["msg"]
+
+
 def did_you_mean(given: str, known: Iterable[str]) -> str:
     """`; did you mean 'length'?` for a near miss, and what is known in any case."""
     names = list(known)

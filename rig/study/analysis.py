@@ -18,6 +18,7 @@ from rig.study.factors import (
     quadratic_terms,
 )
 from rig.study.optimum import Goal, Limit, Optimum, StationaryPoint, optimum, stationary_point
+from rig.study.plan import Plan, Point
 from rig.study.run import Study
 from rig.study.surface import Surface, fit_surface
 
@@ -41,14 +42,8 @@ class Analysis:
 def analyse(study: Study) -> Analysis:
     """Surfaces in the factors' lab units; failed points are left out, which is remarked."""
     plan = study.plan
-    factors = tuple(
-        Factor(f.name, plan.in_lab_units(f.name, f.low), plan.in_lab_units(f.name, f.high))
-        for f in plan.factors
-    )
-    sound = [(point, answer) for point, answer in study.answers if answer.values is not None]
-    points = np.array(
-        [[plan.in_lab_units(f.name, point.values[f.name]) for f in factors] for point, _ in sound]
-    ).reshape(len(sound), len(factors))
+    factors = lab_factors(plan)
+    sound, points = sound_points(study)
     remarks = [f"point {p.name} is left out: {a.error}" for p, a in study.failed]
     design = plan.spec.design
     if design.kind == "sobol" and design.points != power_of_two(design.points):
@@ -59,11 +54,8 @@ def analyse(study: Study) -> Analysis:
     surfaces: dict[str, Surface] = {}
     stationary: dict[str, StationaryPoint] = {}
     for response in plan.spec.responses:
-        values = np.array([a.values[response.name] for _, a in sound if a.values is not None])
         try:
-            surface = fit_surface(
-                response.name, factors, points, values, _terms(plan.spec, factors)
-            )
+            surface = surface_of(study, response.name)
         except StudyError as error:
             remarks.append(f"{response.name} has no surface: {error}")
             continue
@@ -71,7 +63,7 @@ def analyse(study: Study) -> Analysis:
         if surface.remark:
             remarks.append(f"{response.name}: {surface.remark}")
         remarks += [
-            f"{response.name}: the residual of point {sound[run][0].name} stands out."
+            f"{response.name}: the residual of point {sound[run].name} stands out."
             for run in surface.diagnostics.outlying
         ]
         try:
@@ -85,6 +77,32 @@ def analyse(study: Study) -> Analysis:
         remarks.append(str(error))
     limited = tuple(one.name for one in plan.spec.responses if one.is_limited)
     return Analysis(factors, points, surfaces, stationary, best, limited, tuple(remarks))
+
+
+def surface_of(study: Study, response: str) -> Surface:
+    """The surface of one response in lab units; raises StudyError where the runs give none."""
+    factors = lab_factors(study.plan)
+    _, points = sound_points(study)
+    values = [a.values[response] for _, a in study.answers if a.values is not None]
+    return fit_surface(
+        response, factors, points, np.array(values), _terms(study.plan.spec, factors)
+    )
+
+
+def lab_factors(plan: Plan) -> tuple[Factor, ...]:
+    """A plan's factors with levels in lab units."""
+    return tuple(
+        Factor(f.name, plan.in_lab_units(f.name, f.low), plan.in_lab_units(f.name, f.high))
+        for f in plan.factors
+    )
+
+
+def sound_points(study: Study) -> tuple[list[Point], Array]:
+    """Points that have values, and where they are in lab units, (n, k)."""
+    plan = study.plan
+    sound = [point for point, answer in study.answers if answer.values is not None]
+    rows = [[plan.in_lab_units(f.name, p.values[f.name]) for f in plan.factors] for p in sound]
+    return sound, np.array(rows).reshape(len(sound), len(plan.factors))
 
 
 def _terms(spec: StudySpec, factors: tuple[Factor, ...]) -> tuple[Term, ...]:

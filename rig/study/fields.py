@@ -9,7 +9,7 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 
 from rig.spec.actuator import ActuatorSpec
-from rig.spec.explain import did_you_mean, unit_of
+from rig.spec.explain import did_you_mean, first_problem, unit_of
 from rig.spec.material import MaterialSpec
 from rig.spec.quantity import Unit
 from rig.study.errors import StudyError
@@ -56,16 +56,11 @@ class NumericField:
 
 def numeric_field(dotted: str, actuator: ActuatorSpec, material: MaterialSpec) -> NumericField:
     """The field that `dotted` means; raises StudyError, with what there is, for any other."""
-    root, *path = dotted.split(".")
-    roots: dict[str, BaseModel] = {"actuator": actuator, "material": material}
-    known = {
-        f"{name}.{'.'.join(found.path)}": found
-        for name, spec in roots.items()
-        for found in _below(spec, name)
-    }
-    if root not in roots or dotted not in known:
+    everything = [*_below(actuator, "actuator"), *_below(material, "material")]
+    known = {str(found): found for found in everything}
+    if dotted not in known:
         raise StudyError(f"'{dotted}' is no numeric field{did_you_mean(dotted, known)}.")
-    return known[".".join((root, *path))]
+    return known[dotted]
 
 
 def _below(spec: Any, root: str, path: tuple[str, ...] = ()) -> list[NumericField]:
@@ -109,9 +104,7 @@ def with_values(spec: S, values: dict[tuple[str, ...], float]) -> S:
     try:
         return type(spec).model_validate(_as_text(spec, data))
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        raise StudyError(f"{place}: {first['msg']}") from None
+        raise StudyError(first_problem(error)) from None
 
 
 def _as_text(spec: BaseModel, data: dict[str, Any]) -> dict[str, Any]:

@@ -4,38 +4,34 @@ from __future__ import annotations
 
 import numpy as np
 
-from rig.study.analysis import Analysis
+from rig.spec.study import StudyResponse
 from rig.study.beams import ManyBeams
 from rig.study.errors import StudyError
-from rig.study.factors import Array, Factor, coded
-from rig.study.plan import Plan
+from rig.study.factors import Array, coded
+from rig.study.plan import Space
 from rig.study.sensitivity import Model
+from rig.study.surface import Surface
 
 
-def beam_model(plan: Plan, response: str) -> Model:
+def beam_model(space: Space, response: StudyResponse) -> Model:
     """Beam theory itself, of points in SI; the response is an angle, in deg.
 
     Raises StudyError for anything else.
     """
-    (one,) = [r for r in plan.spec.responses if r.name == response]
-    if one.model != "beam" or one.quantity != "angle":
+    if response.model != "beam" or response.quantity != "angle":
         raise StudyError(
-            f"'{response}' is no angle of beam theory; others take the surface of a finished study."
+            f"'{response.name}' is no angle of beam theory; others take the surface of a finished "
+            f"study."
         )
 
     def answers(points: Array) -> Array:
-        values = {f.name: points[:, i] for i, f in enumerate(plan.factors)}
-        beams = ManyBeams.of(plan.space.actuator, plan.space.material, plan.fields, values)
-        return np.degrees(beams.angle(one.pressure))
+        values = {f.name: points[:, i] for i, f in enumerate(space.factors)}
+        beams = ManyBeams.of(space.actuator, space.material, space.fields, values)
+        return np.degrees(beams.angle(response.pressure))
 
     return answers
 
 
-def surface_model(analysis: Analysis, factors: tuple[Factor, ...], response: str) -> Model:
-    """The response surface of a finished study, of points in the units of `factors`."""
-    if response not in analysis.surfaces:
-        raise StudyError(
-            f"the study has no surface of '{response}': " + "; ".join(analysis.remarks)
-        )
-    surface = analysis.surfaces[response]
-    return lambda points: surface.predict(coded(factors, points))
+def surface_model(surface: Surface, space: Space) -> Model:
+    """The response surface of a finished study, of points in SI."""
+    return lambda points: surface.predict(coded(space.factors, points))

@@ -10,7 +10,7 @@ import numpy as np
 
 from rig.mechanics.store import content_key
 from rig.spec.actuator import ActuatorSpec
-from rig.spec.loading import read
+from rig.spec.loading import Loaded, read
 from rig.spec.material import MaterialSpec
 from rig.spec.study import StudyFactor, StudyResponse, StudySpec
 from rig.spec.workspace import Workspace
@@ -142,16 +142,23 @@ class Plan:
 def make_plan(path: Path, workspace: Workspace) -> Plan:
     """The study in a file; raises SpecError, and StudyError for factors that are not in the spec,
     levels that cannot be, and designs that cannot be made."""
-    source = read(path, StudySpec)
+    source, space = read_study(path, workspace)
     spec = source.spec
-    runs = None if spec.runs is None else path.parent / spec.runs
-    space = make_space(path, workspace, spec.actuator, spec.factors, spec.responses, runs)
     levels = actual(space.factors, coded_points(spec.design, len(space.factors)))
     width = len(str(len(levels)))
     points = tuple(space.point(f"{i:0{width}d}", row) for i, row in enumerate(levels.tolist(), 1))
     if all(point.task is None for point in points):
         raise StudyError(f"{path}: no point of the design is a valid spec: {points[0].error}")
     return Plan(spec, source.text, space, points)
+
+
+def read_study(path: Path, workspace: Workspace) -> tuple[Loaded[StudySpec], Space]:
+    """A study's file and its space, without the points of the design; raises as `make_plan`."""
+    source = read(path, StudySpec)
+    spec = source.spec
+    runs = None if spec.runs is None else path.parent / spec.runs
+    space = make_space(path, workspace, spec.actuator, spec.factors, spec.responses, runs)
+    return source, space
 
 
 def make_space(

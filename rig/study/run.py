@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from rig.study.errors import StudyError
 from rig.study.evaluate import evaluate
 from rig.study.executor import Executor
 from rig.study.plan import Plan, Point, Task
@@ -83,15 +84,17 @@ def run_study(
     return Study(plan, answers, len(keys))
 
 
-def known_study(plan: Plan, folder: Folder) -> Study | None:
-    """The study if the answers to all its points are in `folder`, else None."""
+def known_study(plan: Plan, folder: Folder) -> Study:
+    """The finished study in `folder`; raises StudyError where answers are missing."""
     known = {
         point.key: found
         for point in plan.points
         if point.task is not None and (found := folder.known(point.key)) is not None
     }
     if any(point.task is not None and point.key not in known for point in plan.points):
-        return None
+        raise StudyError(
+            f"the study '{plan.spec.name}' is not finished in {folder.path}; run `rig study` first."
+        )
     return Study(plan, _answers(plan, known), 0)
 
 

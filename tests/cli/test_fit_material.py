@@ -67,6 +67,27 @@ def test_a_relaxation_ends_up_in_the_file_and_the_plot_is_written(
     assert "<svg" in plot.read_text()
 
 
+def test_compression_tells_no_strength_and_unreached_strains_are_told_of(
+    rig: Command, tmp_path: Path
+) -> None:
+    strain = np.linspace(-0.5, 0, 40)
+    stretch = 1 + strain
+    rows = "\n".join(f"{e:g},{50 * (s - s**-2):.6g}" for e, s in zip(strain, stretch, strict=True))
+    (tmp_path / "pressed.csv").write_text(f"Strain (-),Stress (kPa)\n{rows}\n")
+    out = tmp_path / "m.yaml"
+    outcome = rig(
+        "fit-material", tmp_path / "pressed.csv", "--energy", "neo-hookean", "--out", out,
+        "--modulus-at=-20,50",
+    )  # fmt: skip
+    assert outcome.code == 0, outcome.err
+    assert "no uniaxial specimen has a strain of 50 %" in outcome.out
+    assert "at -20 %" in outcome.out
+    material = load_material(out)
+    assert material.tensile_strength is None
+    assert material.elongation_at_break is None
+    assert "strains from -0.5 to 0" in material.young_modulus.source
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -75,6 +96,23 @@ def test_a_relaxation_ends_up_in_the_file_and_the_plot_is_written(
         (["--density", "900 kg/m**3", "x.csv"], ("--density-source",)),
         (["--region", "much", "x.csv"], ("LOW:HIGH",)),
         ([], ("at least one file",)),
+        (["--stable-to", "0", "x.csv"], ("--stable-to", "above 1")),
+        (["--stable-to", "nan", "x.csv"], ("--stable-to", "above 1")),
+        (["--modulus-at", "5,0", "x.csv"], ("--modulus-at", "other than 0")),
+        (
+            [
+                "--energy",
+                "neo-hookean",
+                "--density",
+                "-900 kg/m**3",
+                "--density-source",
+                "me",
+                "--out",
+                "m.yaml",
+                "x.csv",
+            ],
+            ("density.value", "greater than 0"),
+        ),
     ],
 )
 def test_bad_arguments_are_explained(

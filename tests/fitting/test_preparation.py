@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rig.fitting.errors import FittingError
+from rig.fitting.families import families
 from rig.fitting.prepare import Preparation, prepare
 from rig.fitting.specimen import (
     Specimen,
@@ -93,3 +94,29 @@ def test_equivalent_modulus_is_stress_over_strain() -> None:
     assert secant_modulus(specimen(), 0.5) == pytest.approx(expected, rel=1e-3)
     with pytest.raises(FittingError, match="within its data"):
         secant_modulus(specimen(), 4.0)
+
+
+def test_a_spike_is_no_rupture() -> None:
+    """Above the largest stress of the curve, a quarter of the way along it."""
+    x = np.linspace(1.0, 3.0, 60)
+    y = 100e3 * (x - x**-2)
+    y[15] = 2 * y[-1]
+    prepared = prepare(
+        [Specimen("spiked", Mode.UNIAXIAL, x, y, "made up")], Preparation(points=1000)
+    )
+    assert prepared.tested[0].stretch == pytest.approx(np.delete(x, 15))
+    assert not any("rupture" in note for note in prepared.notes)
+
+
+@pytest.mark.parametrize("count", [20, 60, 200])
+@pytest.mark.parametrize("mode", list(Mode))
+def test_smooth_curves_have_no_outliers(mode: Mode, count: int) -> None:
+    """Steep at their beginning, or near their locking stretch."""
+    x = np.linspace(1.0, 4.0, count)
+    for name, values in (
+        ("neo-hookean", {"shear_modulus": 150e3}),
+        ("arruda-boyce", {"modulus": 100e3, "locking_stretch": 3.5}),
+    ):
+        y = families(0.499)[name].stress(values, mode, x)
+        smooth = Specimen(name, mode, x, y, "made up")
+        assert without_outlying_points(smooth) is smooth

@@ -10,7 +10,7 @@ from test_run import LIBRARY, STUDY, plan_of
 
 from rig.mechanics.beam import BeamTheory
 from rig.spec.actuator import BellowBendingGeometry
-from rig.study.analysis import analyse
+from rig.study.analysis import surface_of
 from rig.study.beams import ManyBeams
 from rig.study.errors import StudyError
 from rig.study.executor import InProcess
@@ -103,11 +103,13 @@ def test_many_beams_are_the_beam_and_end_where_it_ends() -> None:
 
 def test_the_beams_response_is_sensitive_to_its_wall_first(tmp_path: Path) -> None:
     plan = plan_of(tmp_path)
-    found = sobol_indices(beam_model(plan, "angle"), plan.factors, 2**10, seed=0)
+    found = sobol_indices(
+        beam_model(plan.space, plan.spec.responses[0]), plan.factors, 2**10, seed=0
+    )
     assert found.factors[int(np.argmax(found.total))] == "wall"
     assert np.all(found.total >= found.first - 0.02)
     with pytest.raises(StudyError, match="no angle"):
-        beam_model(plan, "volume")
+        beam_model(plan.space, plan.spec.responses[1])
 
 
 def test_a_finished_studys_surface_answers_as_the_model_does(tmp_path: Path) -> None:
@@ -116,12 +118,14 @@ def test_a_finished_studys_surface_answers_as_the_model_does(tmp_path: Path) -> 
     )
     plan = plan_of(tmp_path, smooth)
     folder = Folder(tmp_path / "out")
-    assert known_study(plan, folder) is None
+    with pytest.raises(StudyError, match="not finished"):
+        known_study(plan, folder)
     run_study(plan, folder, InProcess())
     study = known_study(plan, folder)
-    assert study is not None
-    surface = surface_model(analyse(study), plan.factors, "angle")
-    direct = sobol_indices(beam_model(plan, "angle"), plan.factors, 2**10, seed=0)
+    surface = surface_model(surface_of(study, "angle"), plan.space)
+    direct = sobol_indices(
+        beam_model(plan.space, plan.spec.responses[0]), plan.factors, 2**10, seed=0
+    )
     by_surface = sobol_indices(surface, plan.factors, 2**10, seed=0)
     assert by_surface.total == pytest.approx(direct.total, abs=0.04)
 
@@ -131,12 +135,12 @@ def test_what_cannot_be_sampled_is_refused(tmp_path: Path) -> None:
         sobol_indices(ishigami, THREE, 1000, seed=0)
     plan = plan_of(tmp_path, STUDY.replace("high: 1.8 mm", "high: 3.2 mm"))
     with pytest.raises(StudyError, match="no response"):
-        sobol_indices(beam_model(plan, "angle"), plan.factors, 64, seed=0)
+        sobol_indices(beam_model(plan.space, plan.spec.responses[0]), plan.factors, 64, seed=0)
     with pytest.raises(StudyError, match="narrow the tolerances"):
-        tolerance(beam_model(plan, "angle"), plan.factors, 1000, seed=0)
+        tolerance(beam_model(plan.space, plan.spec.responses[0]), plan.factors, 1000, seed=0)
     plan = plan_of(
         tmp_path, STUDY.replace("material.young_modulus.value", "material.density.value")
         .replace("400 kPa", "1000 kg/m**3").replace("500 kPa", "1200 kg/m**3"),
     )  # fmt: skip
     with pytest.raises(StudyError, match="does not depend"):
-        beam_model(plan, "angle")(np.array([[1.5e-3, 6, 1100]]))
+        beam_model(plan.space, plan.spec.responses[0])(np.array([[1.5e-3, 6, 1100]]))
