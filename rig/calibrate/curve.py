@@ -59,15 +59,20 @@ class Curve:
         return float(np.hypot(fitted, self.hysteresis / np.sqrt(12)))
 
 
+def different_values(references: Sequence[float]) -> int:
+    """How many there are; what differs by rounding is one."""
+    return len({round(value, 9) for value in references})
+
+
 def fit_curve(reading: Array, reference: Array, descending: Sequence[bool]) -> Curve:
     """Fit readings (n,), counted from the zero, against references (n,).
 
     Raises CalibrateError for fewer than five different references, or readings that do not rise.
     """
-    if len({round(float(r), 9) for r in np.sort(reference)}) < LEAST_POINTS:
+    different = different_values(reference.tolist())
+    if different < LEAST_POINTS:
         raise CalibrateError(
-            f"a curve needs at least {LEAST_POINTS} different references; there are "
-            f"{len(set(reference.tolist()))}."
+            f"a curve needs at least {LEAST_POINTS} different references; there are {different}."
         )
     one = np.ones_like(reading)
     linear = least_squares({"offset": one, "slope": reading}, reference)

@@ -15,13 +15,15 @@ from numpy.typing import NDArray
 from rig.calibrate.air import BUOYANCY
 from rig.calibrate.curve import Curve, fit_curve
 from rig.calibrate.errors import CalibrateError
-from rig.calibrate.points import Row, above_zero, column, of_kind
+from rig.calibrate.points import Row, above_zero, column, of_kind, table
 from rig.spec.calibration import Evidence, LoadCellCalibration, Provenance
 from rig.spec.quantity import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 COLUMNS = ("mass_g", "counts", "time_s")
 """`kind` is zero (nothing on it), up, down, or creep (time since the mass was placed)."""
+LEAST_CREEP = 10
+"""Readings under a resting load, below which nothing is said of creep."""
 MODEL = "force = offset + slope n + curvature n^2; grams-force, n in counts above zero"
 
 
@@ -85,14 +87,7 @@ class LoadCellFit:
             provenance=provenance,
             evidence=Evidence(
                 columns=("down", "creep", *COLUMNS),
-                rows=tuple(
-                    (
-                        float(r["kind"] == "down"),
-                        float(r["kind"] == "creep"),
-                        *(float(r[name]) for name in COLUMNS),
-                    )
-                    for r in rows
-                ),
+                rows=table(rows, COLUMNS, ("down", "creep")),
                 fits=(
                     curve.linear.record(MODEL.replace(" + curvature n^2", "")),
                     curve.quadratic.record(MODEL),
@@ -105,7 +100,8 @@ class LoadCellFit:
 def fit_load_cell(rows: Sequence[Row], gravity: float = STANDARD_GRAVITY) -> LoadCellFit:
     """Fit points with the columns `COLUMNS`, in the order of time.
 
-    Raises CalibrateError where they do not suffice.
+    Creep stays unknown with fewer than `LEAST_CREEP` readings of it. Raises CalibrateError where
+    the others do not suffice.
     """
     steady = of_kind(rows, "zero", "up", "down")
     loaded = of_kind(steady, "up", "down")
@@ -116,18 +112,25 @@ def fit_load_cell(rows: Sequence[Row], gravity: float = STANDARD_GRAVITY) -> Loa
         [row["kind"] == "down" for row in loaded],
     )
     crept = of_kind(rows, "creep")
-    creep = fit_creep(column(crept, "time_s"), column(crept, "counts"), drift) if crept else None
+    creep = None
+    if len(crept) >= LEAST_CREEP:
+        zero = column(of_kind(rows, "zero"), "counts")[-1]
+        creep = fit_creep(column(crept, "time_s"), column(crept, "counts") - zero, drift)
     return LoadCellFit(curve, curve.slope * drift, creep)
 
 
 def fit_creep(time_s: Array, counts: Array, drift: float = 0.0) -> Creep:
-    """Creep from readings (n,) at times (n,) since the load came on: the last third less the first.
+    """Creep from readings (n,) above zero at times (n,) since the load came on.
+
+    It is the mean of the last third less the first.
 
     `drift` is the standard uncertainty in counts of a zero found earlier. Raises CalibrateError
-    for fewer than ten readings.
+    for fewer than `LEAST_CREEP` readings.
     """
-    if time_s.size < 10:
-        raise CalibrateError(f"creep needs at least ten readings; there are {time_s.size}.")
+    if time_s.size < LEAST_CREEP:
+        raise CalibrateError(
+            f"creep needs at least {LEAST_CREEP} readings; there are {time_s.size}."
+        )
     late = counts[time_s > time_s.max() * 2 / 3]
     first = float(counts[np.argmin(time_s)])
     scatter = float(late.std(ddof=1)) * np.sqrt(1 + 1 / late.size)

@@ -28,6 +28,19 @@ def column(rows: Sequence[Row], name: str) -> Array:
     return np.array([float(row[name]) for row in rows], dtype=np.float64)
 
 
+def table(
+    rows: Sequence[Row], columns: Sequence[str], kinds: Sequence[str]
+) -> tuple[tuple[float, ...], ...]:
+    """Rows as evidence of a calibration keeps them: 1 under its kind, 0 else, then the numbers."""
+    return tuple(
+        (
+            *(float(row["kind"] == kind) for kind in kinds),
+            *(float(row[name]) for name in columns),
+        )
+        for row in rows
+    )
+
+
 def read_points(path: Path, columns: Sequence[str]) -> list[Row]:
     """Rows of a CSV file with a column `kind` and numbers in `columns`; empty cells count as 0.
 

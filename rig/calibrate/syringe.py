@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from rig.calibrate.air import AIR_KG_M3, BUOYANCY
 from rig.calibrate.errors import CalibrateError
 from rig.calibrate.least_squares import LinearFit, least_squares
-from rig.calibrate.points import Row, column, of_kind
+from rig.calibrate.points import Row, column, of_kind, table
 from rig.spec.calibration import (
     Evidence,
     Provenance,
@@ -157,14 +157,7 @@ class SyringeFit:
             provenance=provenance,
             evidence=Evidence(
                 columns=("dispense", "down", *COLUMNS),
-                rows=tuple(
-                    (
-                        float(r["kind"] == "dispense"),
-                        float(r["kind"] == "down"),
-                        *(float(r[name]) for name in COLUMNS),
-                    )
-                    for r in rows
-                ),
+                rows=table(rows, COLUMNS, ("dispense", "down")),
                 fits=(
                     self.dispensed.record("water = offset + slope x; g, x in mL as counted"),
                     self.compressed.record(

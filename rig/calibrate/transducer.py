@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.calibrate.curve import Curve, fit_curve
-from rig.calibrate.points import Row, above_zero, column, of_kind
+from rig.calibrate.points import Row, above_zero, column, of_kind, table
 from rig.spec.calibration import Evidence, Provenance, TransducerCalibration
 
 COLUMNS = ("reference_kpa", "voltage_v")
@@ -44,10 +44,7 @@ class TransducerFit:
             provenance=provenance,
             evidence=Evidence(
                 columns=("down", *COLUMNS),
-                rows=tuple(
-                    (float(r["kind"] == "down"), float(r["reference_kpa"]), float(r["voltage_v"]))
-                    for r in rows
-                ),
+                rows=table(rows, COLUMNS, ("down",)),
                 fits=(
                     curve.linear.record(MODEL.replace(" + curvature v^2", "")),
                     curve.quadratic.record(MODEL),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -308,8 +309,8 @@ def numbers(text: str, what: str) -> tuple[float, ...]:
         values = tuple(float(part) for part in text.split(","))
     except ValueError:
         raise typer.BadParameter(f"'{text}' is no list of {what} such as 20,50,100") from None
-    if any(value <= 0 for value in values):
-        raise typer.BadParameter(f"{what} must be above zero; got {text}")
+    if not all(0 < value < math.inf for value in values):
+        raise typer.BadParameter(f"{what} must be finite and above zero; got {text}")
     return values
 
 

@@ -46,7 +46,8 @@ def loadcell(
         rig calibrate loadcell --bench mega --masses 10,20,50,100,200 --gravity 9.8118
         --reference "F1 set, cert. 456" --reference-u 0.002
     """
-    from rig.calibrate.load_cell import COLUMNS, fit_load_cell
+    from rig.calibrate.curve import LEAST_POINTS, different_values
+    from rig.calibrate.load_cell import COLUMNS, LEAST_CREEP, fit_load_cell
     from rig.cli._calibration import new_task, numbers, order_of
     from rig.experiment.calibration.procedures import LoadCellPlan, load_cell_points
     from rig.experiment.calibration.references import Standard
@@ -58,6 +59,11 @@ def loadcell(
     capacity_g = task.bench.load_cell.capacity * 1e3
     if max(plan.masses_g) > capacity_g:
         raise typer.BadParameter(f"the load cell carries {capacity_g:g} g at most")
+    different = different_values(plan.masses_g)
+    if points is None and different < LEAST_POINTS:
+        raise typer.BadParameter(
+            f"a line and a bow need {LEAST_POINTS} different masses; {masses} are {different}"
+        )
     rows = task.rows(
         lambda bench, link, taken, stage: load_cell_points(bench, link, plan, taken, stage),
         COLUMNS,
@@ -72,14 +78,18 @@ def loadcell(
             task.bench.load_cell.model,
         ),
     )
-    creep = "" if fit.creep is None else f"; creep {100 * fit.creep.share:+.2g} % of the load"
+    creep = (
+        f"creep not known, as it needs {LEAST_CREEP} readings"
+        if fit.creep is None
+        else f"creep {100 * fit.creep.share:+.2g} % of the load"
+    )
     task.finish(
         made,
         (
             f"{made.counts_per_gram:.6g} counts per gram, u = {100 * made.counts_per_gram_u:.2g} %",
             f"bow {1e6 * made.bow:+.2g} mg in the middle of {1e3 * made.span:.4g} g, "
             f"u = {1e6 * made.linearity_u:.2g} mg; hysteresis {1e3 * fit.curve.hysteresis:+.2g} mg",
-            f"zero returns within u = {1e6 * made.zero_u:.2g} mg{creep}",
+            f"zero returns within u = {1e6 * made.zero_u:.2g} mg; {creep}",
         ),
         "load_cell.calibration",
     )

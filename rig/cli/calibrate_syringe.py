@@ -13,11 +13,15 @@ UNMEASURED_U = 1.0
 """kPa that the weather, and deg C that a room, may differ by from what a bench says."""
 
 
+USED_SHARE = 0.8
+"""Of the stroke, for water: the rest keeps the plunger from its end."""
+
+
 @calibrate.command()
 def syringe(
     bench: options.Bench = "virtual",
     seed: options.Seed = 1,
-    weighings: Annotated[int, typer.Option(min=4, max=50, help="Of the water so far.")] = 6,
+    weighings: Annotated[int, typer.Option(min=4, help="Of the water so far.")] = 6,
     tube_u_ml: Annotated[
         float, typer.Option(min=0, help="Standard uncertainty of the tube's volume, mL.")
     ] = 0.05,
@@ -61,15 +65,25 @@ def syringe(
     """
     from rig.calibrate.syringe import COLUMNS, Surroundings, fit_syringe
     from rig.cli._calibration import new_task, order_of
-    from rig.experiment.calibration.procedures import SyringePlan, syringe_points
+    from rig.experiment.calibration.procedures import (
+        DISPENSED_ML,
+        SyringePlan,
+        syringe_points,
+    )
     from rig.experiment.calibration.references import Standard
 
     task = new_task(
         "syringe", order_of(locals()), lambda r: Standard("simulated balance", r.balance_u)
     )
     syringe_ml = task.bench.syringe.volume * 1e6
-    jogs = max(1, int(0.8 * syringe_ml / weighings / 1.5))
-    plan = SyringePlan(jogs, weighings, task.top_kpa)
+    jogs = int(USED_SHARE * syringe_ml / DISPENSED_ML)
+    if weighings > jogs:
+        raise typer.BadParameter(
+            f"{weighings} weighings of at least {DISPENSED_ML:g} mL each would drive the plunger "
+            f"of {syringe_ml:g} mL into its end; it allows {jogs}",
+            param_hint="--weighings",
+        )
+    plan = SyringePlan(jogs // weighings, weighings, task.top_kpa)
     rows = task.rows(
         lambda bench, link, taken, stage: syringe_points(bench, link, plan, taken, stage),
         COLUMNS,

@@ -139,7 +139,7 @@ def test_a_load_cell_is_found_with_its_creep() -> None:
     shown = {m: 100 + 2003 * m * (1 - BUOYANCY) for m in grams}
     rows = sweep(shown, 100.0, "counts", "mass_g")
     time_s = np.arange(0, 180, 3.0)
-    crept = 400_000 * (1 + 5e-4 * -np.expm1(-time_s / 20))
+    crept = 100 + 400_000 * (1 + 5e-4 * -np.expm1(-time_s / 20))
     rows += [
         {"kind": "creep", "mass_g": 200.0, "counts": c, "time_s": t}
         for t, c in zip(time_s, crept, strict=True)
@@ -153,9 +153,50 @@ def test_a_load_cell_is_found_with_its_creep() -> None:
     assert made.creep_u == pytest.approx(5e-4 / np.sqrt(3), rel=0.02)
 
 
-def test_creep_needs_readings() -> None:
-    with pytest.raises(CalibrateError, match="ten readings"):
+def test_creep_counts_from_the_zero_and_is_as_unsure_as_that() -> None:
+    grams = [10.0, 20.0, 50.0, 100.0, 200.0]
+    zero, drifted = 300_000.0, 300_040.0  # a zero as large as the load must not halve the creep
+    rows = sweep({m: zero + 2000 * m for m in grams}, zero, "counts", "mass_g")
+    rows[-1]["counts"] = drifted
+    time_s = np.arange(0, 60, 3.0)
+    rows += [
+        {"kind": "creep", "mass_g": 200.0, "time_s": t}
+        | {"counts": drifted + 400_000.0 * (1 if t < 1 else 1.001)}
+        for t in time_s
+    ]
+    creep = fit_load_cell(rows).creep
+    assert creep is not None
+    assert creep.share == pytest.approx(1e-3)
+    # the readings do not scatter: all that is unsure is the zero
+    assert creep.share_u == pytest.approx(40 * widening(1) / 400_000)
+
+
+def test_little_creep_is_none_and_the_rest_is_fitted_all_the_same() -> None:
+    rows = sweep({m: 2000 * m for m in [10.0, 20.0, 50.0, 100.0, 200.0]}, 0.0, "counts", "mass_g")
+    nine: list[Row] = [
+        {"kind": "creep", "mass_g": 200.0, "counts": 4e5, "time_s": 3.0 * i} for i in range(9)
+    ]
+    fit = fit_load_cell(rows + nine)
+    assert fit.creep is None
+    assert fit.creep_u == 0.0
+    assert fit_load_cell([*rows, *nine, nine[-1]]).creep is not None
+    with pytest.raises(CalibrateError, match="10 readings"):
         fit_creep(np.arange(5.0), np.ones(5))
+
+
+def test_a_load_cell_found_where_gravity_is_stronger_is_less_sensitive_per_gram_force() -> None:
+    rows = sweep({m: 2000 * m for m in [10.0, 20.0, 50.0, 100.0, 200.0]}, 0.0, "counts", "mass_g")
+    here, there = (
+        fit.calibration(rows, 0.0, PROVENANCE).counts_per_gram
+        for fit in (fit_load_cell(rows), fit_load_cell(rows, 9.832))
+    )
+    assert there / here == pytest.approx(9.80665 / 9.832, rel=1e-9)
+
+
+def test_references_that_differ_by_rounding_count_once() -> None:
+    reference = np.array([1.0, 1.0 + 1e-12, 2.0, 3.0, 4.0])
+    with pytest.raises(CalibrateError, match="there are 4"):
+        fit_curve(np.arange(5.0), reference, [False] * 5)
 
 
 def test_water_has_the_density_of_the_table() -> None:

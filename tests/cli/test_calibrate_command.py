@@ -13,7 +13,7 @@ from rig.cli._calibration import RealCalibrationBench, TerminalReferences
 from rig.experiment.errors import AbortedError
 from rig.link.bus import SlcanBus
 from rig.spec.bench import SerialBoard
-from rig.spec.calibration import TransducerCalibration
+from rig.spec.calibration import LoadCellCalibration, TransducerCalibration
 from rig.spec.loading import load_calibration
 from tests.benches import BEAM_ACTUATOR
 
@@ -203,5 +203,25 @@ def test_every_verb_shows_examples(rig: Command, verb: str) -> None:
 
 
 def test_masses_that_are_none_are_refused(rig: Command) -> None:
-    for masses in ("10,abc", "0,10", "10,20,5000"):
-        assert rig("calibrate", "loadcell", "--masses", masses).code == 2
+    for masses in ("10,abc", "0,10", "10,nan,30,40,50", "10,20,5000", "10,20,30,40,40"):
+        outcome = rig("calibrate", "loadcell", "--masses", masses)
+        assert outcome.code == 2
+        assert "taring" not in outcome.out
+
+
+def test_a_short_look_at_creep_leaves_it_unknown(rig: Command, tmp_path: Path) -> None:
+    out = tmp_path / "cell.yaml"
+    command = ("calibrate", "loadcell", "--bench", "virtual-beam", "--cycles", "1")
+    outcome = rig(*command, "--creep-s", "6", "--out", out)
+    assert outcome.code == 0, outcome.err
+    assert "creep not known" in outcome.out
+    made = load_calibration(out)
+    assert isinstance(made, LoadCellCalibration)
+    assert made.creep_u == 0.0
+
+
+def test_weighings_that_would_drive_the_plunger_into_its_end_are_refused(rig: Command) -> None:
+    outcome = rig("calibrate", "syringe", "--weighings", "41")
+    assert outcome.code == 2
+    assert "it allows 32" in outcome.err
+    assert "homing" not in outcome.out

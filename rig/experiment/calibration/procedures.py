@@ -25,12 +25,16 @@ REST_S = 3.0
 """For gas to take the temperature of the wall, and for a person's load to come to rest."""
 READING_S = 2.0
 CELL_READING_S = 3.0
+JOG_MOVES_S = 0.5
+"""A jog ends by itself after this time."""
 DISPENSE_ML_S = 3.0
+DISPENSED_ML = DISPENSE_ML_S * JOG_MOVES_S
+"""What a jog pushes out."""
 COMPRESSION_ML_S = 2.0
 COMPRESSION_KPA = 2.5
 """More than what a jog at that flow, 1 mL, adds to the pressure in a syringe of 60 mL."""
 JOG_S = 1.0
-"""A jog ends by itself after half a second; the rest is for the water to come to rest."""
+"""The jog, and the rest for the water to come to rest."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +56,7 @@ class LoadCellPlan:
 
 @dataclass(frozen=True)
 class SyringePlan:
-    """Jogs of about 1.5 mL between weighings, weighings, and the highest pressure in kPa."""
+    """Jogs of `DISPENSED_ML` between weighings, weighings, and the highest pressure in kPa."""
 
     jogs: int
     weighings: int
