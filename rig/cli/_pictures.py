@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Generator, Iterable, Iterator
 from itertools import takewhile
 
-import cv2
-import numpy as np
-
 from rig.board.camera import open_camera
 from rig.cli._interruption import catching_signals
 from rig.spec.bench import BenchSpec
 from rig.spec.calibration import CameraCalibration
 from rig.vision.footage import expand, read_frames
-from rig.vision.segment import Image, as_image
+from rig.vision.segment import Image, decoded
 
 
 def until_interrupted(pictures: Iterable[Image]) -> Generator[Image, None, None]:
@@ -32,12 +29,14 @@ def frames_of_files(named: list[str]) -> Iterator[Image]:
 def frames_of_camera(bench: BenchSpec, mode: CameraCalibration) -> Iterator[Image]:
     """What a real bench's camera sees, in the mode of its present calibration.
 
-    Ends when nobody asks any more. Raises BoardError.
+    Frames that are no readable pictures are passed over. Ends when nobody asks any more. Raises
+    BoardError.
     """
     camera = open_camera(bench.camera, mode, lambda: 0.0)
     try:
         while True:
-            jpeg = camera.grab()[1]
-            yield as_image(cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR))
+            image = decoded(camera.grab()[1])
+            if image is not None:
+                yield image
     finally:
         camera.close()

@@ -201,12 +201,7 @@ def new_session(
     `faults` on a real bench, BoardError.
     """
     workspace = Workspace.find()
-    session = _session(workspace.setup(actuator, bench, protocol), seed, workspace.logs)
-    calibrations, today = session.request.setup.calibrations, date.today()
-    if not expired:
-        require_valid_calibrations(calibrations, today)
-    elif caution := expired_calibrations(calibrations, today):
-        session = replace(session, request=replace(session.request, cautions=(caution,)))
+    session = _session(workspace.setup(actuator, bench, protocol), seed, workspace.logs, expired)
     if faults is None:
         return session
     require_simulated(session.request.setup.bench)
@@ -232,13 +227,20 @@ def examine(actuator: str, bench: str, seed: int) -> list[Finding]:
         opened.close()
 
 
-def resumed_session(run: Path) -> Session:
-    """A session from the specs and seed that are recorded in a run."""
+def resumed_session(run: Path, *, expired: bool = False) -> Session:
+    """A session from the specs and seed that are recorded in a run.
+
+    Raises ExperimentError for recorded calibrations that have run out meanwhile, unless `expired`.
+    """
     reader = RunReader(run)
-    return _session(reader.setup(), reader.start().seed, run.parent)
+    return _session(reader.setup(), reader.start().seed, run.parent, expired)
 
 
-def _session(setup: Setup, seed: int, logs: Path) -> Session:
+def _session(setup: Setup, seed: int, logs: Path, expired: bool) -> Session:
+    today = date.today()
+    if not expired:
+        require_valid_calibrations(setup.calibrations, today)
+    caution = expired_calibrations(setup.calibrations, today)
     request = RunRequest(
         setup=setup,
         plan=make_plan(setup.protocol, setup.actuator, setup.bench),
@@ -249,6 +251,7 @@ def _session(setup: Setup, seed: int, logs: Path) -> Session:
         created=None
         if setup.bench.simulated
         else datetime.now().astimezone().isoformat(timespec="seconds"),
+        cautions=() if caution is None else (caution,),
     )
     request.board_parameters()  # a board would refuse them only once the bench is open
     return Session(request, logs, _RunConsole())

@@ -9,6 +9,11 @@ import typer
 
 from rig.cli.app import app
 
+ExpiredCalibrations = Annotated[
+    bool,
+    typer.Option("--expired-calibrations", help="Use calibrations past their last valid day, too."),
+]
+
 
 @app.command()
 def characterise(
@@ -27,12 +32,7 @@ def characterise(
         str | None,
         typer.Option(help="Break the simulated bench: name in models/faults, or a file."),
     ] = None,
-    expired_calibrations: Annotated[
-        bool,
-        typer.Option(
-            "--expired-calibrations", help="Use calibrations past their last valid day, too."
-        ),
-    ] = False,
+    expired_calibrations: ExpiredCalibrations = False,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check and print the plan; move nothing.")
     ] = False,
@@ -61,6 +61,7 @@ def characterise(
 @app.command()
 def resume(
     run: Annotated[Path, typer.Argument(help="Folder of an interrupted run.")],
+    expired_calibrations: ExpiredCalibrations = False,
 ) -> None:
     """Continue a run after its last complete point, then write its report.
 
@@ -72,6 +73,6 @@ def resume(
     """
     from rig.cli._session import resumed_session
 
-    session = resumed_session(run)
+    session = resumed_session(run, expired=expired_calibrations)
     session.show_plan()
     raise typer.Exit(session.resume(run))

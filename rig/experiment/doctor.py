@@ -22,6 +22,7 @@ from rig.link.errors import LinkLostError
 from rig.link.schema import load_schema
 from rig.spec.workspace import BenchCalibrations
 from rig.vision.measure import AngleMeter
+from rig.vision.segment import decoded
 
 Status = Literal["ok", "warning", "failed"]
 Seen = dict[str, float | int | str | bool]
@@ -230,11 +231,9 @@ def _pressure(mean_kpa: float, noise_kpa: float, vented: bool) -> Finding:
 
 
 def _camera(bench: Bench, request: RunRequest) -> Finding:
-    import cv2
-
     calibrations = request.setup.calibrations
     _, jpeg = bench.camera.grab()
-    image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+    image = decoded(jpeg)
     if image is None:
         return Finding("camera", "failed", advice="it delivers no readable picture")
     level = float(np.mean(image))
@@ -246,7 +245,7 @@ def _camera(bench: Bench, request: RunRequest) -> Finding:
     if not DARK < level < BRIGHT:
         advice = "the picture is too dark or too bright: check light and exposure"
         return Finding("camera", "failed", seen, advice)
-    found = AngleMeter(calibrations.camera, calibrations.ruler).measure(np.asarray(image, np.uint8))
+    found = AngleMeter(calibrations.camera, calibrations.ruler).measure(image)
     if not found.accepted or found.angle_deg is None:
         advice = f"ruler or actuator cannot be measured: {found.reason}"
         return Finding("camera", "failed", seen, advice)

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-
 from rig.experiment.bench import Camera
 from rig.experiment.errors import ExperimentError
 from rig.experiment.evaluate import angle_point, force_point
@@ -18,6 +16,7 @@ from rig.record.documents import AngleReading, PointDocument, PointKey
 from rig.record.writer import RunWriter
 from rig.spec.calibration import CameraCalibration, LoadCellCalibration
 from rig.vision.measure import AngleMeter
+from rig.vision.segment import decoded
 
 RETRY_FACTOR = 2
 """At most this many times the wanted readings are taken to make up for rejected ones."""
@@ -25,9 +24,7 @@ RETRY_FACTOR = 2
 
 def read_angle(meter: AngleMeter, jpeg: bytes, key: PointKey, frame: int) -> AngleReading:
     """Vision result of one recorded frame; the same for a live run and a replay."""
-    import cv2
-
-    image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+    image = decoded(jpeg)
     if image is None:
         return AngleReading(
             key=key,
@@ -38,7 +35,7 @@ def read_angle(meter: AngleMeter, jpeg: bytes, key: PointKey, frame: int) -> Ang
             accepted=False,
             reason="the frame is no readable picture",
         )
-    result = meter.measure(np.asarray(image, np.uint8))
+    result = meter.measure(image)
     return AngleReading(
         key=key,
         frame=frame,

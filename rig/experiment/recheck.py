@@ -6,12 +6,12 @@ touched, or a calibration of another one, leaves them off it by more than they c
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 
 from rig.experiment.bench import Camera
 from rig.experiment.errors import ExperimentError
 from rig.vision.measure import AngleMeter
+from rig.vision.segment import decoded
 
 LOOKS = 3
 MAX_RESIDUAL_PX = 0.15
@@ -27,11 +27,11 @@ def recheck_camera(camera: Camera, meter: AngleMeter) -> float:
     residuals: list[float] = []
     reason = ""
     for _ in range(LOOKS):
-        image = cv2.imdecode(np.frombuffer(camera.grab()[1], np.uint8), cv2.IMREAD_COLOR)
+        image = decoded(camera.grab()[1])
         if image is None:
             reason = "the frame is no readable picture"
             continue
-        seen = meter.check_ruler(np.asarray(image, np.uint8))
+        seen = meter.check_ruler(image)
         if seen.residual_px is None:
             reason = seen.reason
         else:

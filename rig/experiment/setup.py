@@ -18,7 +18,7 @@ def expired_calibrations(calibrations: BenchCalibrations, today: date) -> str | 
     if not expired:
         return None
     listed = ", ".join(f"{role.replace('_', ' ')} (until {day})" for role, day in expired.items())
-    return f"the calibration of {listed} has expired on {today}."
+    return f"the calibration of {listed} is no longer valid on {today}."
 
 
 def require_valid_calibrations(calibrations: BenchCalibrations, today: date) -> None:
@@ -27,8 +27,8 @@ def require_valid_calibrations(calibrations: BenchCalibrations, today: date) -> 
     if why is not None:
         raise ExperimentError(
             f"{why} Nothing was moved. Calibrate again (`rig calibrate --help`) and name the new "
-            "file in the bench, or use it all the same with --expired-calibrations: the log and "
-            "the report will say so."
+            "file in the bench of a new run, or use it all the same with --expired-calibrations: "
+            "the log and the report will say so."
         )
 
 

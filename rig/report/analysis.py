@@ -46,7 +46,6 @@ from rig.report.summary import (
 from rig.spec.published import PublishedReference
 from rig.spec.quantity import STANDARD_GRAVITY
 from rig.spec.workspace import Setup
-from rig.validate.budget import READINGS
 from rig.validate.metrics import (
     ComparisonErrors,
     ValidationStatement,
@@ -443,22 +442,20 @@ def comparison_errors(
     error, u_random, dof = [], [], []
     common: dict[str, list[float]] = {}
     differences = [curve.value(level.pressures_kpa) - level.values for level in levels]
-    repeated = {
-        level.target_kpa: d for level, d in zip(levels, differences, strict=True) if d.size > 1
+    repeated: dict[tuple[str, float], Array] = {
+        (level.direction, level.target_kpa): d
+        for level, d in zip(levels, differences, strict=True)
+        if d.size > 1
     }
     for index, (level, difference) in enumerate(zip(levels, differences, strict=True)):
-        scatter = nearest_scatter(repeated, level.target_kpa)
+        scatter = nearest_scatter(repeated, level.direction, level.target_kpa)
         repeats = repeats_component(difference, level.points, scatter)
         error.append(float(difference.mean()))
         u_random.append(repeats.contribution)
         dof.append(repeats.dof)
         slope = curve.slope(float(level.pressures_kpa.mean()))
         effects = {c.name: c.sensitivity * c.u for c in calibration_components(level.points)}
-        effects |= {
-            c.name: slope * c.sensitivity * c.u
-            for c in level.pressure_components
-            if not c.name.startswith(READINGS)
-        }
+        effects |= {c.name: slope * c.sensitivity * c.u for c in level.pressure_calibrations}
         for source, effect in effects.items():
             common.setdefault(source, [0.0] * len(levels))[index] = effect
     return ComparisonErrors(

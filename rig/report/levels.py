@@ -52,6 +52,11 @@ class Level:
         return combine(self.mean, self.components)
 
     @property
+    def pressure_calibrations(self) -> tuple[Component, ...]:
+        """`pressure_components` without the scatter of readings, which the repeats hold."""
+        return without_readings(self.pressure_components)
+
+    @property
     def pressure(self) -> Estimate:
         """The mean pressure in kPa with its combined uncertainty."""
         return combine(float(self.pressures_kpa.mean()), self.pressure_components)
@@ -64,11 +69,12 @@ def levels_of(points: Sequence[PointDocument]) -> list[Level]:
         key: np.array([p.value for p in group], dtype=np.float64) for key, group in groups.items()
     }
     means = {key: float(values.mean()) for key, values in measured.items()}
+    repeated = {key: values for key, values in measured.items() if values.size > 1}
     levels = []
     for (direction, target), group in groups.items():
         branch = {kpa: mean for (way, kpa), mean in means.items() if way == direction}
         slope = _slope(branch, target)
-        scatter = nearest_scatter({key[1]: v for key, v in measured.items() if v.size > 1}, target)
+        scatter = nearest_scatter(repeated, direction, target)
         pressure = pressure_components(group)
         way: Direction = "up" if direction == "up" else "down"
         levels.append(
@@ -83,8 +89,7 @@ def levels_of(points: Sequence[PointDocument]) -> list[Level]:
                     # pressure scatter from repeat to repeat and are in that line
                     *(
                         replace(c, sensitivity=slope * c.sensitivity)
-                        for c in pressure
-                        if not c.name.startswith(READINGS)
+                        for c in without_readings(pressure)
                     ),
                 ),
                 pressure,
@@ -111,11 +116,22 @@ def repeats_component(
     return replace(line, name=f"{READINGS} (nothing was repeated)")
 
 
-def nearest_scatter(repeated: Mapping[float, Array], target_kpa: float) -> Repeatability | None:
-    """Repeatability at the repeated pressure nearest to `target_kpa`: scatter depends on it."""
+def nearest_scatter(
+    repeated: Mapping[tuple[str, float], Array], direction: str, target_kpa: float
+) -> Repeatability | None:
+    """Repeatability at the repeated pressure nearest to `target_kpa`: scatter depends on it.
+
+    `repeated` is by direction and pressure; the own direction comes first where both repeat.
+    """
     if not repeated:
         return None
-    return repeatability([repeated[min(repeated, key=lambda kpa: abs(kpa - target_kpa))]])
+    nearest = min(repeated, key=lambda key: (abs(key[1] - target_kpa), key[0] != direction))
+    return repeatability([repeated[nearest]])
+
+
+def without_readings(components: Iterable[Component]) -> tuple[Component, ...]:
+    """Those that are not the scatter of readings."""
+    return tuple(c for c in components if not c.name.startswith(READINGS))
 
 
 def calibration_components(group: Sequence[PointDocument]) -> tuple[Component, ...]:

@@ -13,7 +13,7 @@ from rig.report.data import RunData
 from rig.vision.errors import VisionError
 from rig.vision.measure import AngleMeter
 from rig.vision.overlay import draw_overlay
-from rig.vision.segment import Image
+from rig.vision.segment import Image, decoded
 
 PICTURES = 6
 WIDTH_PX = 640
@@ -59,10 +59,9 @@ def _chosen(data: RunData) -> list[PointKey]:
 
 
 def _picture(meter: AngleMeter, jpeg: bytes, key: PointKey) -> Picture | None:
-    image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
-    if image is None:
+    frame = decoded(jpeg)
+    if frame is None:
         return None
-    frame = np.asarray(image, dtype=np.uint8)
     where = f"{key.target_kpa:g} kPa"
     try:
         measurement = meter.measure(frame)

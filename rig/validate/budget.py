@@ -55,7 +55,13 @@ def force_components(cell: LoadCellCalibration, force_g: float) -> tuple[Compone
             sensitivity=cell.bow_share(force_g / 1e3),
             unit="g",
         ),
-        Component("load-cell creep", cell.creep_u, sensitivity=force_g, unit="1"),
+        Component(
+            "load-cell creep",
+            cell.creep_u,
+            sensitivity=force_g,
+            unit="1",
+            distribution="rectangular",
+        ),
         Component("load-cell zero", cell.zero_u * 1e3, unit="g"),
     )
 

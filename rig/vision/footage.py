@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
-import numpy as np
 
 from rig.vision.errors import VisionError
-from rig.vision.segment import Image, as_image
+from rig.vision.segment import Image, as_image, decoded
 
 IMAGE_SUFFIXES = {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp"}
 VIDEO_SUFFIXES = {".mp4", ".avi", ".mov", ".mkv", ".m4v", ".webm", ".mpg", ".mpeg", ".wmv"}
@@ -103,12 +102,12 @@ def _still(path: Path) -> Image:
     if _is_cut(data):
         raise VisionError(f"{path} is cut short: its end is missing; copy it again.")
     try:
-        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+        image = decoded(data)
     except (cv2.error, MemoryError) as error:  # such as a header that claims 100000 x 100000
         raise VisionError(f"{path} cannot be decoded: {_words(error)}.") from None
     if image is None:
         raise VisionError(f"{path} is damaged: it starts like an image but cannot be decoded.")
-    return as_image(image)
+    return image
 
 
 def _is_cut(data: bytes) -> bool:

@@ -60,6 +60,12 @@ def as_image(array: object) -> Image:
     return np.asarray(array, dtype=np.uint8)
 
 
+def decoded(coded: bytes) -> Image | None:
+    """A coded picture, such as a camera's JPEG, as BGR; None where it is no readable one."""
+    image = cv2.imdecode(np.frombuffer(coded, np.uint8), cv2.IMREAD_COLOR)
+    return None if image is None else as_image(image)
+
+
 def pyramid(image: Image) -> list[Image]:
     """The frame and its area-averaged halves, down to at least `COARSE_WIDTH` px wide."""
     levels = [image]

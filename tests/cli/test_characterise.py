@@ -8,12 +8,14 @@ import signal
 import subprocess
 import sys
 import time
+from datetime import date
 from pathlib import Path
 
 import pytest
 
 from rig.errors import RigError
 from rig.record.reader import RunReader
+from rig.spec.workspace import BenchCalibrations
 
 from .conftest import ROOT, Command
 
@@ -107,6 +109,17 @@ def test_a_complete_run_has_nothing_to_resume(rig: Command, quick_run: Path) -> 
     outcome = rig("resume", quick_run)
     assert outcome.code != 0
     assert "complete" in outcome.err
+
+
+def test_a_run_is_not_resumed_on_calibrations_that_ran_out_meanwhile(
+    rig: Command, quick_run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(BenchCalibrations, "expired", lambda *_: {"load_cell": date(2026, 1, 31)})
+    refused = rig("resume", quick_run)
+    assert refused.code != 0
+    assert "load cell (until 2026-01-31) is no longer valid" in refused.err
+    assert "--expired-calibrations" in refused.err
+    assert "complete" in rig("resume", quick_run, "--expired-calibrations").err
 
 
 def test_ctrl_c_vents_closes_the_log_and_says_how_to_go_on(tmp_path: Path) -> None:

@@ -71,11 +71,15 @@ class Coverage:
         low, high = binom.interval(0.999, len(self.errors), 0.95)
         return bool(low <= self.held <= high)
 
+    @property
+    def rms_ratio(self) -> float:
+        """R.m.s. error over U: 0.51 for a normal error; far less says that U is too large."""
+        return float(np.sqrt(np.mean((self.errors / self.u95) ** 2)))
+
     def __str__(self) -> str:
-        ratio = float(np.sqrt(np.mean((self.errors / self.u95) ** 2)))
         return (
             f"{self.held} of {len(self.errors)} = {self.share:.1%} within; r.m.s. error / U = "
-            f"{ratio:.3f} (normal: {1 / 1.96:.3f})"
+            f"{self.rms_ratio:.3f} (normal: {1 / 1.96:.3f})"
         )
 
 

@@ -50,8 +50,8 @@ def test_the_calibration_of_another_lens_is_refused(camera):
         recheck_camera(camera, AngleMeter(other, CALIBRATIONS.ruler))
 
 
-def test_a_camera_in_the_dark_is_refused_with_the_reason(camera):
-    camera.seen.fault = CameraFault.DARK
+def test_a_camera_in_the_dark_is_refused_with_the_reason(camera, monkeypatch):
+    monkeypatch.setattr(camera.seen, "fault", CameraFault.DARK)
     with pytest.raises(
         ExperimentError, match=r"cannot be checked before the run \(ruler not found"
     ):

@@ -16,6 +16,7 @@ from rig.mechanics.response import Response
 from rig.record.reader import RunReader
 from rig.report.analysis import build_summary
 from rig.report.build import analyse
+from rig.report.levels import nearest_scatter
 from rig.report.summary import RunSummary, rounded, run_summary_schema
 from rig.spec.workspace import library_root
 
@@ -90,6 +91,19 @@ def test_a_single_repeat_borrows_the_scatter_at_its_own_pressure(summary: RunSum
         (line,) = (line for line in point.budget.lines if line.source == "repeats")
         assert line.u == up[point.pressure_kpa].sd
         assert line.degrees_of_freedom == 2
+
+
+def test_a_single_repeat_borrows_from_its_own_direction_where_both_repeat() -> None:
+    calm, wild, far = (np.array([0.0, step]) for step in (0.1, 2.0, 9.0))
+    repeated = {("up", 5.0): calm, ("down", 5.0): wild, ("up", 9.0): far}
+    for direction, own in (("up", calm), ("down", wild)):
+        found = nearest_scatter(repeated, direction, 5.0)
+        assert found is not None
+        assert found.sd == pytest.approx(own.std(ddof=1))
+    only_up = nearest_scatter(repeated, "down", 8.0)
+    assert only_up is not None
+    assert only_up.sd == pytest.approx(far.std(ddof=1))
+    assert nearest_scatter({}, "up", 5.0) is None
 
 
 def test_repeats_that_scatter_differently_are_told(summary: RunSummary, run_folder: Path) -> None:
