@@ -209,7 +209,10 @@ def test_masses_that_are_none_are_refused(rig: Command) -> None:
         assert "taring" not in outcome.out
 
 
-def test_a_short_look_at_creep_leaves_it_unknown(rig: Command, tmp_path: Path) -> None:
+def test_a_short_look_at_creep_leaves_it_unknown(
+    rig: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
     out = tmp_path / "cell.yaml"
     command = ("calibrate", "loadcell", "--bench", "virtual-beam", "--cycles", "1")
     outcome = rig(*command, "--creep-s", "6", "--out", out)
