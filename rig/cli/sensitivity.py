@@ -12,6 +12,7 @@ from rig.cli.app import app
 
 if TYPE_CHECKING:
     from rig.spec.workspace import Workspace
+    from rig.study.analysis import Check
     from rig.study.factors import Factor
     from rig.study.sensitivity import Model
     from rig.study.surface import Surface
@@ -52,6 +53,7 @@ def sensitivity(
     Example: `rig sensitivity bellow-bending-beam --method sobol`
     """
     import json
+    from dataclasses import asdict
 
     from rig.spec.workspace import Workspace
     from rig.study.model import beam_model, surface_model
@@ -66,24 +68,38 @@ def sensitivity(
         raise typer.BadParameter(
             f"'{wanted}' is no response of it; expected {', '.join(responses)}"
         )
+    check = None
     if study is None:
         model = beam_model(space, responses[wanted])
     else:
-        model = surface_model(_surface(path, workspace, study, wanted), space)
+        surface, check = _surface(path, workspace, study, wanted)
+        model = surface_model(surface, space)
     found = _computed(method, model, space.factors, samples, seed)
     if as_json:
-        typer.echo(json.dumps({"response": wanted, "method": method.value, **found}, indent=2))
+        judged = {} if check is None else {"check": asdict(check)}
+        told = {"response": wanted, "method": method.value, **judged, **found}
+        typer.echo(json.dumps(told, indent=2))
         return
     _show(wanted, found)
+    if study is not None:
+        typer.echo(
+            f"at {check.words}"
+            if check is not None
+            else "the surface was not checked: give the study check_points"
+        )
 
 
-def _surface(path: Path, workspace: Workspace, folder: Path, response: str) -> Surface:
-    from rig.study.analysis import surface_of
+def _surface(
+    path: Path, workspace: Workspace, folder: Path, response: str
+) -> tuple[Surface, Check | None]:
+    from rig.study.analysis import check_of, surface_of
     from rig.study.plan import make_plan
     from rig.study.results import Folder
     from rig.study.run import known_study
 
-    return surface_of(known_study(make_plan(path, workspace), Folder(folder)), response)
+    finished = known_study(make_plan(path, workspace), Folder(folder))
+    surface = surface_of(finished, response)
+    return surface, check_of(finished, surface)
 
 
 def _computed(

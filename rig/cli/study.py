@@ -170,6 +170,9 @@ def _show(console: Console, finished: Study, analysis: Analysis) -> None:
             for name, value in surface.actual_coefficients().items()
         )
         console.print(f"{surface.response} = {equation}".replace("+ -", "- "), soft_wrap=True)
+        check = analysis.checks.get(surface.response)
+        if check is not None:
+            console.print(f"at {check.words}", soft_wrap=True)
         normality = surface.diagnostics.normality
         if normality is not None:
             console.print(
@@ -254,8 +257,11 @@ def _as_json(finished: Study, analysis: Analysis) -> str:
 
 
 def _plain(surface: Surface, analysis: Analysis) -> dict[str, Any]:
+    from dataclasses import asdict
+
     from rig.study.factors import term_name
 
+    check = analysis.checks.get(surface.response)
     point = analysis.stationary.get(surface.response)
     names = [term_name(term, surface.factors) for term in surface.terms]
     return {
@@ -271,6 +277,7 @@ def _plain(surface: Surface, analysis: Analysis) -> dict[str, Any]:
         "adequate_precision": surface.adequate_precision,
         "coefficient_of_variation": surface.coefficient_of_variation,
         "normality_p": surface.diagnostics.normality,
+        "check": None if check is None else asdict(check),
         "stationary_point": None
         if point is None
         else {

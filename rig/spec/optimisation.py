@@ -13,7 +13,7 @@ from rig.spec.study import StudyFactor, StudyResponse, require_distinct
 class WantedResponse(StudyResponse):
     """A response with a goal, a target or limits."""
 
-    target: Number | None = Field(None, description="deg, mm, g, mL or kPa")
+    target: Number | None = Field(None, description="as 'at_least'")
 
     @model_validator(mode="after")
     def _one_wish(self) -> WantedResponse:

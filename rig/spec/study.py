@@ -10,9 +10,26 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from rig.spec.base import Count, Integer, Name, Number, SpecModel, require
+from rig.spec.explain import one_of
 from rig.spec.quantity import Pressure
 
-QuantityName = Literal["angle", "displacement", "blocked_force", "volume", "max_von_mises"]
+QuantityName = Literal[
+    "angle",
+    "displacement",
+    "blocked_force",
+    "volume",
+    "max_von_mises",
+    "angle_range",
+    "tip_travel",
+    "max_strain",
+    "safety_factor",
+    "outer_diameter",
+    "groove_width",
+]
+_IN_UNITS = "deg, mm, g, mL, kPa, %, or a plain factor"
+_MEASURED = ("angle", "blocked_force")
+_OF_SHAPES = ("outer_diameter", "groove_width")
+_OF_STRESS = ("max_von_mises", "max_strain", "safety_factor")
 
 
 class StudyFactor(SpecModel):
@@ -76,17 +93,17 @@ Design = Annotated[
 
 
 class StudyResponse(SpecModel):
-    """One number of every point: a quantity of a model, or of a recorded run, at a pressure."""
+    """One number of every point: a quantity of a model, of a recorded run, or of the shape."""
 
     name: Name
     quantity: QuantityName
-    model: Literal["beam", "fe", "run"] = Field(
-        description="run: of the run folder that is called as the point"
+    model: Literal["beam", "fe", "run", "shape"] = Field(
+        description="run: of the run folder that is called as the point; shape: at rest"
     )
-    pressure: Pressure = Field(ge=0)
+    pressure: Pressure = Field(0.0, ge=0, description="not of shapes")
     goal: Literal["maximise", "minimise"] | None = None
-    at_least: Number | None = Field(None, description="deg, mm, g, mL or kPa")
-    at_most: Number | None = Field(None, description="deg, mm, g, mL or kPa")
+    at_least: Number | None = Field(None, description=_IN_UNITS)
+    at_most: Number | None = Field(None, description=_IN_UNITS)
 
     @property
     def is_limited(self) -> bool:
@@ -94,14 +111,23 @@ class StudyResponse(SpecModel):
         return self.at_least is not None or self.at_most is not None
 
     @model_validator(mode="after")
-    def _limits_are_ordered(self) -> StudyResponse:
+    def _can_be_answered(self) -> StudyResponse:
         if self.at_least is not None and self.at_most is not None:
             require(self.at_least < self.at_most, "expected 'at_least' below 'at_most'")
         if self.model == "run":
-            require(
-                self.quantity in ("angle", "blocked_force"),
-                "a run measures 'angle' and 'blocked_force'",
-            )
+            require(self.quantity in _MEASURED, f"a run measures {one_of(_MEASURED)}")
+        require(
+            (self.model == "shape") == (self.quantity in _OF_SHAPES),
+            f"the model 'shape' tells {one_of(_OF_SHAPES)}, and no other does",
+        )
+        require(
+            self.model == "fe" or self.quantity not in _OF_STRESS,
+            f"'{self.quantity}' is told by the model 'fe' only",
+        )
+        require(
+            self.model == "shape" or "pressure" in self.model_fields_set,
+            "expected 'pressure', as 5 kPa",
+        )
         return self
 
 
@@ -126,6 +152,12 @@ class StudySpec(SpecModel):
     )
     factors: tuple[StudyFactor, ...] = Field(min_length=1)
     design: Design
+    check_points: Integer = Field(
+        0,
+        ge=0,
+        description="points between the levels, of a Latin hypercube, that surfaces are not "
+        "fitted to but judged by",
+    )
     responses: tuple[StudyResponse, ...] = Field(min_length=1)
 
     @model_validator(mode="after")

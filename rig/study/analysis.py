@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from rig.study.factors import (
     Array,
     Factor,
     Term,
+    coded,
     interaction_terms,
     linear_terms,
     quadratic_terms,
@@ -30,8 +32,10 @@ class Analysis:
     factors: tuple[Factor, ...]
     """In lab units."""
     points: Array
-    """Runs that have values, in lab units, (n, k)."""
+    """Runs that surfaces are fitted to, in lab units, (n, k)."""
     surfaces: dict[str, Surface]
+    checks: dict[str, Check]
+    """Response to the error of its surface, where the study has check points."""
     stationary: dict[str, StationaryPoint]
     best: Optimum | None
     limited: tuple[str, ...]
@@ -43,7 +47,7 @@ def analyse(study: Study) -> Analysis:
     """Surfaces in the factors' lab units; failed points are left out, which is remarked."""
     plan = study.plan
     factors = lab_factors(plan)
-    sound, points = sound_points(study)
+    fitted = [point for point, _ in study.fitted]
     remarks = [f"point {p.name} is left out: {a.error}" for p, a in study.failed]
     design = plan.spec.design
     if design.kind == "sobol" and design.points != power_of_two(design.points):
@@ -52,6 +56,7 @@ def analyse(study: Study) -> Analysis:
             f"{power_of_two(design.points)}, would be."
         )
     surfaces: dict[str, Surface] = {}
+    checks: dict[str, Check] = {}
     stationary: dict[str, StationaryPoint] = {}
     for response in plan.spec.responses:
         try:
@@ -60,10 +65,13 @@ def analyse(study: Study) -> Analysis:
             remarks.append(f"{response.name} has no surface: {error}")
             continue
         surfaces[response.name] = surface
+        check = check_of(study, surface)
+        if check is not None:
+            checks[response.name] = check
         if surface.remark:
             remarks.append(f"{response.name}: {surface.remark}")
         remarks += [
-            f"{response.name}: the residual of point {sound[run].name} stands out."
+            f"{response.name}: the residual of point {fitted[run].name} stands out."
             for run in surface.diagnostics.outlying
         ]
         try:
@@ -76,17 +84,57 @@ def analyse(study: Study) -> Analysis:
     except StudyError as error:
         remarks.append(str(error))
     limited = tuple(one.name for one in plan.spec.responses if one.is_limited)
-    return Analysis(factors, points, surfaces, stationary, best, limited, tuple(remarks))
+    return Analysis(
+        factors,
+        points_of(plan, fitted),
+        surfaces,
+        checks,
+        stationary,
+        best,
+        limited,
+        tuple(remarks),
+    )
 
 
 def surface_of(study: Study, response: str) -> Surface:
     """The surface of one response in lab units; raises StudyError where the runs give none."""
     factors = lab_factors(study.plan)
-    _, points = sound_points(study)
-    values = [a.values[response] for _, a in study.answers if a.values is not None]
-    return fit_surface(
-        response, factors, points, np.array(values), _terms(study.plan.spec, factors)
-    )
+    values = np.array([values[response] for _, values in study.fitted])
+    points = points_of(study.plan, [point for point, _ in study.fitted])
+    return fit_surface(response, factors, points, values, _terms(study.plan.spec, factors))
+
+
+@dataclass(frozen=True)
+class Check:
+    """How far a surface is from points that it was not fitted to, in the response's field unit."""
+
+    points: int
+    rmse: float
+    largest: float
+    share: float
+    """The root mean square over the range of the response, of all points."""
+
+    @property
+    def words(self) -> str:
+        """One line for people."""
+        return (
+            f"{self.points} points that it was not fitted to, the surface is off by "
+            f"{self.rmse:.3g} (root mean square, {100 * self.share:.2g} % of the range), "
+            f"{self.largest:.3g} at most"
+        )
+
+
+def check_of(study: Study, surface: Surface) -> Check | None:
+    """The surface's error at the study's check points; None where there are none."""
+    if not study.checked:
+        return None
+    name = surface.response
+    truth = np.array([values[name] for _, values in study.checked])
+    points = points_of(study.plan, [point for point, _ in study.checked])
+    error = surface.predict(coded(surface.factors, points)) - truth
+    known = [values[name] for _, values in (*study.fitted, *study.checked)]
+    rmse = float(np.sqrt(np.mean(error**2)))
+    return Check(error.size, rmse, float(np.max(np.abs(error))), rmse / float(np.ptp(known)))
 
 
 def lab_factors(plan: Plan) -> tuple[Factor, ...]:
@@ -97,12 +145,10 @@ def lab_factors(plan: Plan) -> tuple[Factor, ...]:
     )
 
 
-def sound_points(study: Study) -> tuple[list[Point], Array]:
-    """Points that have values, and where they are in lab units, (n, k)."""
-    plan = study.plan
-    sound = [point for point, answer in study.answers if answer.values is not None]
-    rows = [[plan.in_lab_units(f.name, p.values[f.name]) for f in plan.factors] for p in sound]
-    return sound, np.array(rows).reshape(len(sound), len(plan.factors))
+def points_of(plan: Plan, points: Sequence[Point]) -> Array:
+    """Points in lab units, (n, k)."""
+    rows = [[plan.in_lab_units(f.name, p.values[f.name]) for f in plan.factors] for p in points]
+    return np.array(rows).reshape(len(points), len(plan.factors))
 
 
 def _terms(spec: StudySpec, factors: tuple[Factor, ...]) -> tuple[Term, ...]:

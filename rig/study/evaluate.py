@@ -9,22 +9,13 @@ from typing import Any
 import numpy as np
 
 from rig.mechanics.job import Job
-from rig.mechanics.model import predict
 from rig.mechanics.store import FolderStore
-from rig.mechanics.table import COLUMNS, rows
-from rig.spec.study import QuantityName, StudyResponse
+from rig.spec.study import StudyResponse
 from rig.study.errors import StudyError
 from rig.study.plan import Task
+from rig.study.quantities import Asked
 from rig.study.summary import read_experiments
 
-UNITS: dict[QuantityName, str] = {
-    "angle": "deg",
-    "displacement": "mm",
-    "blocked_force": "g",
-    "volume": "ml",
-    "max_von_mises": "kpa",
-}
-"""Quantity to the unit of its responses, as the columns of `rig predict` have it."""
 _EXPERIMENTS = {"angle": "deformation", "blocked_force": "blocked_force"}
 
 
@@ -38,22 +29,18 @@ def evaluate(task: Task) -> dict[str, float]:
 
 
 def _of_model(task: Task, model: str, responses: list[StudyResponse]) -> dict[str, float]:
-    pressures = sorted({one.pressure for one in responses})
-    response = predict(
-        task.actuator, task.material, model, np.array(pressures), Job(FolderStore.of_user())
+    asked = Asked(
+        task.actuator,
+        task.material,
+        model,
+        [one.pressure for one in responses],
+        Job(FolderStore.of_user()),
     )
-    table = rows(response)
     values = {}
     for one in responses:
-        at = COLUMNS.index(f"{one.quantity}_{UNITS[one.quantity]}")
-        value = table[pressures.index(one.pressure)][at]
-        if not isinstance(value, float):
-            raise StudyError(
-                f"model '{model}' gives no {one.quantity} of the family "
-                f"'{task.actuator.geometry.family}'; ask for another response."
-            )
+        value = asked.value(one.quantity, one.pressure)
         if not np.isfinite(value):
-            why = "; ".join(response.shortfalls) or "the calculation did not get there"
+            why = "; ".join(asked.response.shortfalls) or "the calculation did not get there"
             raise StudyError(f"{one.name} at {one.pressure / 1e3:g} kPa: {why}")
         values[one.name] = value
     return values

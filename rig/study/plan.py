@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,7 @@ from rig.mechanics.store import content_key
 from rig.spec.actuator import ActuatorSpec
 from rig.spec.loading import Loaded, read
 from rig.spec.material import MaterialSpec
-from rig.spec.study import StudyFactor, StudyResponse, StudySpec
+from rig.spec.study import SpaceFillingDesign, StudyFactor, StudyResponse, StudySpec
 from rig.spec.workspace import Workspace
 from rig.study.design import coded_points
 from rig.study.errors import StudyError
@@ -60,6 +60,8 @@ class Point:
     key: str
     error: str | None = None
     """Why it is none."""
+    is_check: bool = False
+    """Whether surfaces are judged by it instead of being fitted to it."""
 
 
 @dataclass(frozen=True)
@@ -149,7 +151,16 @@ def make_plan(path: Path, workspace: Workspace) -> Plan:
     points = tuple(space.point(f"{i:0{width}d}", row) for i, row in enumerate(levels.tolist(), 1))
     if all(point.task is None for point in points):
         raise StudyError(f"{path}: no point of the design is a valid spec: {points[0].error}")
-    return Plan(spec, source.text, space, points)
+    return Plan(spec, source.text, space, (*points, *_check_points(space, spec.check_points)))
+
+
+def _check_points(space: Space, count: int) -> list[Point]:
+    if not count:
+        return []
+    design = SpaceFillingDesign(kind="latin-hypercube", points=count)
+    rows = actual(space.factors, coded_points(design, len(space.factors)))
+    points = (space.point(f"check-{i}", row) for i, row in enumerate(rows.tolist(), 1))
+    return [replace(point, is_check=True) for point in points]
 
 
 def read_study(path: Path, workspace: Workspace) -> tuple[Loaded[StudySpec], Space]:

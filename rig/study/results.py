@@ -14,8 +14,8 @@ from typing import Any
 from rig import __version__
 from rig.spec.workspace import is_path
 from rig.study.errors import StudyError
-from rig.study.evaluate import UNITS
 from rig.study.plan import Plan, Point, Space, Task
+from rig.study.quantities import UNITS
 
 RESULTS, MANIFEST, ANSWERS = "results.parquet", "manifest.json", "answers"
 

@@ -35,6 +35,23 @@ class Study:
     """Points that were computed now, not known before; replicates once."""
 
     @property
+    def fitted(self) -> tuple[tuple[Point, Mapping[str, float]], ...]:
+        """Points with values that surfaces are fitted to."""
+        return self._sound(is_check=False)
+
+    @property
+    def checked(self) -> tuple[tuple[Point, Mapping[str, float]], ...]:
+        """Points with values that surfaces are judged by."""
+        return self._sound(is_check=True)
+
+    def _sound(self, *, is_check: bool) -> tuple[tuple[Point, Mapping[str, float]], ...]:
+        return tuple(
+            (p, a.values)
+            for p, a in self.answers
+            if a.values is not None and p.is_check is is_check
+        )
+
+    @property
     def failed(self) -> tuple[tuple[Point, Answer], ...]:
         """Points without values."""
         return tuple((p, a) for p, a in self.answers if a.values is None)

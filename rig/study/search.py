@@ -29,6 +29,9 @@ from rig.study.factors import Array, actual
 from rig.study.plan import Point, Space, Task
 from rig.study.results import Answer, Folder
 
+_BEYOND = 0.25
+"""Of a factor's range: so far beyond each bound values are drawn, which then count as the bound.
+Optima often lie on bounds, which a value drawn between them never meets."""
 _LOST = 1.0
 """Violation of a point without an answer: as bad as a limit missed by its own size."""
 
@@ -240,7 +243,7 @@ def _bayesian(how: BayesianSearch, memory: Memory) -> None:
     names = [one.name for one in memory.space.factors]
 
     def objective(trial: Any) -> float:
-        unit = np.array([trial.suggest_float(name, 0.0, 1.0) for name in names])
+        unit = np.array([trial.suggest_float(name, -_BEYOND, 1 + _BEYOND) for name in names])
         found = memory.at(unit)
         for number, violation in enumerate(found.violation.tolist()):
             trial.set_constraint(str(number), violation)

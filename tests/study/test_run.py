@@ -255,3 +255,29 @@ def test_studies_that_cannot_be_are_explained(
         plan_of(tmp_path, STUDY.replace(old, new))
     for word in (*words, "study.yaml"):
         assert word in str(caught.value)
+
+
+def test_surfaces_are_judged_by_points_that_they_were_not_fitted_to(tmp_path: Path) -> None:
+    """Walls squared are a parabola, walls to the fourth are not."""
+    text = STUDY.replace("responses:", "check_points: 5\nresponses:")
+    plan = plan_of(tmp_path, text)
+    assert [p.name for p in plan.points if p.is_check] == [f"check-{i}" for i in range(1, 6)]
+    assert len(plan.points) == 20
+
+    def powers(task: Task) -> Mapping[str, float]:
+        wall = 1e3 * task.actuator.geometry.wall_thickness
+        return {"angle": wall**2, "volume": wall**4}
+
+    study = run_study(plan, Folder(tmp_path / "out"), InProcess(), function=powers)
+    assert study is not None
+    found = analyse(study)
+    assert len(found.points) == 15
+    exact, missed = found.checks["angle"], found.checks["volume"]
+    assert exact.points == 5
+    assert exact.largest == pytest.approx(0, abs=1e-9)
+    walls = np.array([1e3 * p.values["wall"] for p, _ in study.checked])
+    levels = np.array([1.2, 1.5, 1.8])
+    parabola = np.polynomial.Polynomial.fit(levels, levels**4, 2)
+    error = parabola(walls) - walls**4
+    assert missed.largest == pytest.approx(np.max(np.abs(error)), rel=1e-6)
+    assert missed.rmse == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-6)
