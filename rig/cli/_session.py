@@ -24,7 +24,8 @@ from rig.experiment.bench import Bench, Observer
 from rig.experiment.doctor import Finding, look_at_bench, look_at_machine
 from rig.experiment.errors import ExperimentError
 from rig.experiment.plan import make_plan
-from rig.experiment.run import RunOutcome, new_run, resume_run
+from rig.experiment.recorded import RunOutcome
+from rig.experiment.run import new_run, resume_run
 from rig.experiment.setup import (
     RunRequest,
     expired_calibrations,
@@ -140,7 +141,7 @@ class Session:
                     faults=faults,
                     job=job,
                 )
-        _require_measured_calibrations(setup)
+        require_measured_calibrations(setup)
         return RealBench(setup.bench, setup.calibrations.camera, self._ask, start_s=start_s)
 
     def open_without_log(self) -> Bench:
@@ -257,7 +258,7 @@ def _session(setup: Setup, seed: int, logs: Path, expired: bool) -> Session:
     return Session(request, logs, _RunConsole())
 
 
-def _require_measured_calibrations(setup: Setup) -> None:
+def require_measured_calibrations(setup: Setup) -> None:
     """Refuse a real bench with the calibrations of the virtual one: its figures would be false."""
     named = setup.calibrations.by_role().items()
     simulated = [role.replace("_", " ") for role, c in named if c.provenance.simulated]

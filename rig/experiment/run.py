@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-import platform
-from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass
-from importlib import metadata
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
-import rig
-from rig.errors import RigError
 from rig.experiment.bench import Bench, Fixture, Observer
-from rig.experiment.errors import AbortedError
 from rig.experiment.measure import AngleMeasurement, ForceMeasurement, Measurement
 from rig.experiment.plan import Sweep
 from rig.experiment.plausible import ResponseCheck, require_zero
@@ -20,7 +14,6 @@ from rig.experiment.prepare import (
     condition,
     leave_home,
     make_ready,
-    make_safe,
     take_over,
     tare,
     vent,
@@ -28,33 +21,23 @@ from rig.experiment.prepare import (
     write_parameters,
 )
 from rig.experiment.recheck import recheck_camera
+from rig.experiment.recorded import RunOutcome, carry_out, explaining_disk_errors, versions
 from rig.experiment.recorder import LinkRecorder
 from rig.experiment.setup import RunRequest
 from rig.experiment.sweep import Arrival, approach, go_to, settle
-from rig.link.client import Identity, RigLink
+from rig.link.client import RigLink
 from rig.link.schema import load_schema
 from rig.record.documents import (
     ExperimentName,
     PointKey,
     ResumeDocument,
     StartDocument,
-    StopDocument,
 )
-from rig.record.errors import RecordError
 from rig.record.writer import RunWriter
 from rig.spec.protocol import BlockedForceProtocol, DeformationProtocol
 from rig.vision.measure import AngleMeter
 
 FIXTURES: Mapping[ExperimentName, Fixture] = {"deformation": "free", "blocked_force": "blocked"}
-RECORDED_LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "cantools", "mcap")
-
-
-@dataclass(frozen=True)
-class RunOutcome:
-    """How a run ended; `error` is what stopped it, if anything did."""
-
-    stop: StopDocument
-    error: RigError | None
 
 
 @dataclass(frozen=True)
@@ -91,7 +74,7 @@ def new_run(
         material=setup.material.name,
         seed=request.seed,
         created=request.created,
-        versions=_versions(identity),
+        versions=versions(identity),
         parameters=parameters,
     )
     texts = {**setup.attachments(), **request.enclosures}
@@ -99,7 +82,7 @@ def new_run(
     files["rig.dbc"] = load_schema().text.encode()
     context = RunContext(bench, link, request, observer)
     with (
-        _explaining_disk_errors(folder),
+        explaining_disk_errors(folder),
         RunWriter.create(folder, start, files, units=load_schema().units()) as record,
     ):
         return _recorded(context, record, done=())
@@ -116,7 +99,7 @@ def resume_run(
     """Do what is left of the plan and append it to the log in `folder`; see `new_run`."""
     # the log is locked before the bench hears anything: another process may be using both
     with (
-        _explaining_disk_errors(folder),
+        explaining_disk_errors(folder),
         RunWriter.resume(folder, units=load_schema().units()) as record,
     ):
         link = RigLink(bench.bus, interrupted=interrupted)
@@ -126,22 +109,10 @@ def resume_run(
             resumed_s=link.now_s,
             points_kept=len(done),
             seed=request.seed,
-            versions=_versions(identity),
+            versions=versions(identity),
         )
         record.resume_note(note, link.now_s)
         return _recorded(RunContext(bench, link, request, observer), record, done)
-
-
-@contextmanager
-def _explaining_disk_errors(folder: Path) -> Iterator[None]:
-    """What the disk refuses becomes a RecordError; the bench is safe by then."""
-    try:
-        yield
-    except OSError as error:
-        raise RecordError(
-            f"{folder}: the log cannot be written: {error}. The bench was vented; every complete "
-            f"point is kept. Free space on the disk, then `rig resume {folder}`."
-        ) from error
 
 
 def _configure(link: RigLink, request: RunRequest) -> dict[str, float]:
@@ -149,50 +120,16 @@ def _configure(link: RigLink, request: RunRequest) -> dict[str, float]:
     return write_parameters(link, request.board_parameters())
 
 
-def _versions(identity: Identity) -> dict[str, str]:
-    versions = {
-        "rig": rig.__version__,
-        "firmware": identity.firmware_git,
-        "protocol": f"{identity.protocol_version} (schema {identity.schema_crc:04x})",
-        "python": platform.python_version(),
-    }
-    return versions | {name: metadata.version(name) for name in RECORDED_LIBRARIES}
-
-
 def _recorded(context: RunContext, record: RunWriter, done: Collection[PointKey]) -> RunOutcome:
-    link = context.link
-    recorder = LinkRecorder(record)
-    link.set_tap(recorder)
-    for caution in context.request.cautions:
-        record.event(link.now_s, "caution", {"what": caution}, "warning")
-    error: RigError | None = None
-    crash: BaseException | None = None
-    try:
-        _experiments(context, record, recorder, frozenset(done))
-        stop = StopDocument(exit_status="success", reason="all points were measured")
-    except (AbortedError, KeyboardInterrupt) as stopped:
-        error = stopped if isinstance(stopped, AbortedError) else AbortedError("interrupted")
-        stop = StopDocument(exit_status="aborted", reason=str(error))
-    except RigError as failure:
-        error = failure
-        stop = StopDocument(exit_status="failed", reason=str(failure))
-    except BaseException as unforeseen:  # the bench must be safe before anything else is told
-        crash = unforeseen
-        stop = StopDocument(exit_status="failed", reason=f"{type(crash).__name__}: {crash}")
-        # the log may be what broke (a full disk): venting must not depend on it
-        recorder.drop_what_cannot_be_written()
-    try:
-        context.observer.stage("making the bench safe")
-        ending = make_safe(link)
-        recorder.flush()
-        record.event(link.now_s, "made safe", {"result": ending})
-        lost = {"frames_lost": link.frames_lost}
-        record.event(link.now_s, "link statistics", asdict(link.statistics) | lost)
-        record.stop(stop, link.now_s)
-    finally:
-        if crash is not None:
-            raise crash
-    return RunOutcome(stop, error)
+    request = context.request
+    return carry_out(
+        context.link,
+        record,
+        lambda recorder: _experiments(context, record, recorder, frozenset(done)),
+        success="all points were measured",
+        cautions=request.cautions,
+        stage=context.observer.stage,
+    )
 
 
 def _experiments(

@@ -73,6 +73,10 @@ class BoardStatus:
     emergency_stop: bool
     uptime_s: int
     reset_cause: str
+    command_number: int
+    """Of the last command that the board processed."""
+    command_result: str
+    """What it made of that: accepted, or why not."""
 
 
 @dataclass
@@ -120,6 +124,7 @@ class RigLink:
         self._interrupted = interrupted
         self._alive: dict[int, int] = {}
         self._command_number = 0
+        self._posted: tuple[int, str, float] | None = None
         self._request_number = 0
         self._expected_state: str | None = None
         self._last_heartbeat_s = float("-inf")
@@ -178,6 +183,7 @@ class RigLink:
         if self._raise_faults:
             self._check_fault()
             self._check_state()
+            self._check_posted()
         return messages
 
     def wait(self, duration_s: float) -> list[Message]:
@@ -219,6 +225,8 @@ class RigLink:
                 emergency_stop=bool(values["emergency_stop"]),
                 uptime_s=int(values["uptime_s"]),
                 reset_cause=self._reset_causes.get(int(values["reset_cause"]), "unknown"),
+                command_number=int(values["command_number"]),
+                command_result=self._results.get(int(values["command_result"]), "unknown"),
             )
         elif message.name == "FAULT":
             code = self._faults.get(int(values["code"]), "unknown")
@@ -267,6 +275,22 @@ class RigLink:
                 f"{'' if self.status.homed else ' and not homed'}. Did it lose its supply or was "
                 "it reset? Check both, then `rig resume` the run."
             )
+
+    def _check_posted(self) -> None:
+        if self._posted is None or self.status is None:
+            return
+        number, opcode, argument = self._posted
+        if self.status.command_number == number:
+            self._posted = None
+            if self.status.command_result != "accepted":
+                raise self._refused(opcode, argument, self.status.command_result)
+
+    def _refused(self, opcode: str, argument: float, result: str) -> CommandRefusedError:
+        state = self.status.state if self.status else "unknown"
+        return CommandRefusedError(
+            f"the board refused '{opcode}' ({argument:g}): {result}; its state is '{state}'. "
+            f"{_REFUSAL_HINTS.get(result, '')}"
+        )
 
     # --- sending ---------------------------------------------------------------------------
 
@@ -347,9 +371,8 @@ class RigLink:
         `argument` is in the unit of the command (kPa for set_pressure, mL/s for jog). Raises
         CommandRefusedError with the board's reason, LinkLostError when no answer comes.
         """
-        # the board takes the number of its last command for a repetition: count commands apart
-        number = self._command_number = self._command_number % 255 + 1
-        values = {"opcode": self._opcodes[opcode], "number": number, "argument": argument}
+        self._posted = None
+        number, values = self._numbered(opcode, argument)
         end_s = self.now_s + timeout_s
         sent_s = float("-inf")
         while self.now_s < end_s:
@@ -362,16 +385,26 @@ class RigLink:
                     self.statistics.add_round_trip(self.now_s - sent_s)
                     result = self._results.get(int(message.values["command_result"]), "unknown")
                     if result != "accepted":
-                        state = self.status.state if self.status else "unknown"
-                        raise CommandRefusedError(
-                            f"the board refused '{opcode}' ({argument:g}): {result}; its state "
-                            f"is '{state}'. {_REFUSAL_HINTS.get(result, '')}"
-                        )
+                        raise self._refused(opcode, argument, result)
                     return
         raise LinkLostError(
             f"the board at {self._bus.name} did not acknowledge '{opcode}' within {timeout_s:g} s; "
             "check the cable and the board."
         )
+
+    def post(self, opcode: str, argument: float = 0.0) -> None:
+        """Send a command once and go on; for streams in which the next replaces a lost one.
+
+        A later `receive` raises CommandRefusedError if the board refuses it.
+        """
+        number, values = self._numbered(opcode, argument)
+        self._posted = (number, opcode, argument)
+        self._send("COMMAND", **values)
+
+    def _numbered(self, opcode: str, argument: float) -> tuple[int, dict[str, float]]:
+        # the board takes the number of its last command for a repetition: count commands apart
+        number = self._command_number = self._command_number % 255 + 1
+        return number, {"opcode": self._opcodes[opcode], "number": number, "argument": argument}
 
     def await_state(self, wanted: str, timeout_s: float) -> None:
         """Receive until the board is in the state `wanted`."""

@@ -61,6 +61,7 @@ STYLE: Any = {
 }
 SMALL = (5.6, 3.9)
 WIDE = (11.2, 3.3)
+TALL = (5.6, 5.0)
 MAX_COLUMNS = 900
 """Columns of a decimated trace."""
 
@@ -102,7 +103,7 @@ class Residuals:
     expanded: Array
 
 
-def _styled(draw: Callable[Arguments, Chart]) -> Callable[Arguments, Chart]:
+def styled(draw: Callable[Arguments, Chart]) -> Callable[Arguments, Chart]:
     """Draw in our style whatever matplotlib is configured to on this machine."""
 
     @functools.wraps(draw)
@@ -113,7 +114,7 @@ def _styled(draw: Callable[Arguments, Chart]) -> Callable[Arguments, Chart]:
     return styled
 
 
-@_styled
+@styled
 def response_chart(
     name: str,
     axis_label: str,
@@ -123,7 +124,7 @@ def response_chart(
     alt: str,
 ) -> Chart:
     """A quantity against pressure: uncertainty band, means, single repeats, model curves."""
-    figure, axes = _figure(SMALL)
+    figure, axes = new_figure(SMALL)
     axes.plot(*repeats, ".", color=COLOURS["series-1"], alpha=0.35, ms=3.5, zorder=2)
     labels: list[_EndLabel] = []
     for branch, is_down in zip(branches, (False, True), strict=False):
@@ -166,13 +167,13 @@ def response_chart(
     axes.set_xlabel("pressure (kPa)")
     axes.set_ylabel(axis_label)
     _place_labels(axes, labels)
-    return _chart(figure, name, alt)
+    return finished(figure, name, alt)
 
 
-@_styled
+@styled
 def comparison_chart(name: str, axis_label: str, branches: Sequence[Branch], alt: str) -> Chart:
     """The same quantity of several runs against pressure, with bars of 95 %."""
-    figure, axes = _figure(SMALL)
+    figure, axes = new_figure(SMALL)
     for number, branch in enumerate(branches):
         axes.errorbar(
             branch.pressure_kpa,
@@ -189,11 +190,11 @@ def comparison_chart(name: str, axis_label: str, branches: Sequence[Branch], alt
         )
     axes.set_xlabel("pressure (kPa)")
     axes.set_ylabel(axis_label)
-    _legend_below(figure)
-    return _chart(figure, name, alt)
+    legend_below(figure)
+    return finished(figure, name, alt)
 
 
-@_styled
+@styled
 def residual_chart(
     name: str, axis_label: str, residuals: Sequence[Residuals], alt: str, *, legend: bool = False
 ) -> Chart:
@@ -201,7 +202,7 @@ def residual_chart(
 
     Labels stand at the curves' ends, or with `legend` below, where long ones have room.
     """
-    figure, axes = _figure(SMALL)
+    figure, axes = new_figure(SMALL)
     axes.axhline(0, color=COLOURS["ink"], lw=1)
     labels = []
     for number, one in enumerate(residuals):
@@ -226,13 +227,13 @@ def residual_chart(
     axes.set_xlabel("pressure (kPa)")
     axes.set_ylabel(axis_label)
     if legend:
-        _legend_below(figure)
+        legend_below(figure)
     else:
         _place_labels(axes, labels)
-    return _chart(figure, name, alt)
+    return finished(figure, name, alt)
 
 
-@_styled
+@styled
 def repeats_chart(
     name: str,
     axis_label: str,
@@ -241,7 +242,7 @@ def repeats_chart(
     alt: str,
 ) -> Chart:
     """Deviation of each repeat from the mean of its pressure, with one standard deviation."""
-    figure, axes = _figure(SMALL)
+    figure, axes = new_figure(SMALL)
     axes.axhline(0, color=COLOURS["ink"], lw=1)
     for sign in (-1, 1):
         axes.axhline(sign * sd, color=COLOURS["muted"], lw=1, ls=(0, (5, 3)))
@@ -258,13 +259,13 @@ def repeats_chart(
         )
     axes.set_xlabel("pressure (kPa)")
     axes.set_ylabel(axis_label)
-    return _chart(figure, name, alt)
+    return finished(figure, name, alt)
 
 
-@_styled
+@styled
 def trace_chart(name: str, trace: Trace, alt: str) -> Chart:
     """Pressure and set-point over the whole run; extremes survive the decimation."""
-    figure, axes = _figure(WIDE)
+    figure, axes = new_figure(WIDE)
     if trace.time_s.size:
         minutes, low, high = envelope(trace.time_s / 60, trace.pressure_kpa)
         axes.fill_between(
@@ -283,10 +284,10 @@ def trace_chart(name: str, trace: Trace, alt: str) -> Chart:
         axes.set_xlim(0, float(minutes[-1]))
     axes.set_xlabel("bench time (min)")
     axes.set_ylabel("pressure (kPa)")
-    return _chart(figure, name, alt)
+    return finished(figure, name, alt)
 
 
-@_styled
+@styled
 def step_chart(
     name: str,
     trace: Trace,
@@ -297,7 +298,7 @@ def step_chart(
     alt: str,
 ) -> Chart:
     """One step of the pressure loop with its tolerance band and settling time."""
-    figure, axes = _figure(SMALL)
+    figure, axes = new_figure(SMALL)
     since = trace.time_s - started_s
     axes.axhspan(
         target_kpa - tolerance_kpa,
@@ -329,7 +330,7 @@ def step_chart(
     axes.legend(loc="lower right", frameon=False)
     axes.set_xlabel("time since the set-point (s)")
     axes.set_ylabel("pressure (kPa)")
-    return _chart(figure, name, alt)
+    return finished(figure, name, alt)
 
 
 def envelope(x: Array, y: Array) -> tuple[Array, Array, Array]:
@@ -372,8 +373,9 @@ def _place_labels(axes: Axes, labels: Sequence[_EndLabel]) -> None:
     axes.set_ylim(low, high)
 
 
-def _legend_below(figure: Figure) -> None:
-    figure.legend(loc="outside lower left", ncols=1, frameon=False)
+def legend_below(figure: Figure, columns: int = 1) -> None:
+    """A legend outside of the axes, where long labels have room."""
+    figure.legend(loc="outside lower left", ncols=columns, frameon=False)
 
 
 def _model_colour(number: int) -> str:
@@ -381,14 +383,25 @@ def _model_colour(number: int) -> str:
     return COLOURS[f"series-{number % 4 + 2}"]
 
 
-def _figure(size: tuple[float, float]) -> tuple[Figure, Axes]:
+def new_figure(size: tuple[float, float]) -> tuple[Figure, Axes]:
+    """A figure of `size` in inches with one set of axes."""
     figure = Figure(figsize=size, layout="constrained")
     axes = figure.add_subplot()
     axes.tick_params(length=3)
     return figure, axes
 
 
-def _chart(figure: Figure, name: str, alt: str) -> Chart:
+def stacked(size: tuple[float, float], heights: tuple[int, ...]) -> tuple[Figure, tuple[Axes, ...]]:
+    """A figure with axes above each other on one abscissa, of these relative heights."""
+    figure = Figure(figsize=size, layout="constrained")
+    all_axes = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
+    for axes in all_axes:
+        axes.tick_params(length=3)
+    return figure, tuple(all_axes)
+
+
+def finished(figure: Figure, name: str, alt: str) -> Chart:
+    """The drawn figure as a chart; `name` keeps its ids apart from those of others on a page."""
     buffer = io.StringIO()
     figure.savefig(
         buffer,

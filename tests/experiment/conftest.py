@@ -13,7 +13,8 @@ from rig.board.truth import TruthSample, read_truth
 from rig.board.virtual import VirtualBench
 from rig.experiment.bench import Nobody, Observer
 from rig.experiment.plan import make_plan
-from rig.experiment.run import RunOutcome, new_run, resume_run
+from rig.experiment.recorded import RunOutcome
+from rig.experiment.run import new_run, resume_run
 from rig.experiment.setup import RunRequest
 from rig.mechanics.profile import cavity_volume
 from rig.record.reader import RunReader
