@@ -4,22 +4,27 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from rig.cli.app import app
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
+    from rig.cli._gauges import Gauge, Reading
     from rig.vision.footage import Frame
-    from rig.vision.measure import AngleMeasurement, AngleMeter
+    from rig.vision.measure import AngleMeter
     from rig.vision.segment import Image
-    from rig.vision.table import Row
+    from rig.vision.table import Column, Row
 
 MAX_SHOWN = 60
 """Frames that are listed one by one; of longer footage the table shows one line a file."""
+BUDGET_HEADER = (
+    *("file", "frame", "quantity", "source", "type", "unit"),
+    *("u", "sensitivity", "contribution", "degrees_of_freedom"),
+)
 
 
 class Bends(StrEnum):
@@ -29,9 +34,20 @@ class Bends(StrEnum):
     RIGHT = "right"
 
 
+class Quantity(StrEnum):
+    """What is measured."""
+
+    ANGLE = "angle"
+    DISPLACEMENT = "displacement"
+    BACKBONE = "backbone"
+
+
 @app.command()
 def measure(
     footage: Annotated[list[str], typer.Argument(help="images, videos, folders or globs")],
+    quantity: Annotated[
+        Quantity, typer.Option(help="backbone: bend radius, bend angle and how round it is")
+    ] = Quantity.ANGLE,
     csv: Annotated[Path | None, typer.Option(help="write all rows to this file, too")] = None,
     overlay: Annotated[
         Path | None, typer.Option(help="folder for pictures with the measurement drawn in")
@@ -52,12 +68,27 @@ def measure(
             "--track", help="follow the cap through videos: faster, and jumps are rejected"
         ),
     ] = False,
+    budget: Annotated[
+        Path | None,
+        typer.Option(help="file for what makes displacement or backbone uncertain, line by line"),
+    ] = None,
+    markers: Annotated[
+        tuple[int, int],
+        typer.Option(min=0, max=49, help="ArUco 4X4_50 markers: at the fixed end, at the moving"),
+    ] = (0, 1),
+    out_of_plane_u_mm: Annotated[
+        float,
+        typer.Option(min=0, help="of markers or backbone from the ruler's plane, u in mm"),
+    ] = 1.0,
 ) -> None:
-    """Measure the bending angle in images and videos.
+    """Measure the bending angle, a displacement or the backbone in images and videos.
 
     The actuator hangs from a blue connector and ends in a blue cap. The angle is 0 for a straight
     actuator and grows with bending; u95 is its expanded uncertainty. A frame that cannot be
     trusted is listed as rejected, with the reason.
+
+    Displacement is that of one marker from another since the first frame, of a video or of all
+    images. It and the backbone need --camera and --ruler, and the ruler in the frame.
 
     Exits with 0 only if every file gave at least one accepted frame.
 
@@ -68,22 +99,38 @@ def measure(
     """
     from rig.vision.errors import VisionError
     from rig.vision.footage import expand
+    from rig.vision.table import header
 
     files = expand(footage)
-    meter = _meter(camera, ruler, bends)
+    if quantity is Quantity.ANGLE:
+        if budget is not None:
+            raise typer.BadParameter("the report of a run has the budget of its angles")
+        gauge = _angle(_meter(camera, ruler, bends), track, overlay is not None)
+    else:
+        if track or overlay is not None:
+            raise typer.BadParameter("--track and --overlay are for the angle")
+        gauge = _length(quantity, _meter(camera, ruler, bends), markers, out_of_plane_u_mm)
     if overlay is not None:
         _make_folder(overlay)
-    rows = list(_progress(_measure(files, meter, overlay, track), len(files)))
-    _show(rows)
+    rows: list[Row] = []
+    readings: list[Reading] = []
+    for row, reading in _progress(_measure(files, gauge, overlay), len(files)):
+        rows.append(row)
+        readings.append(reading)
+    _show(rows, gauge.columns)
+    if quantity is not Quantity.ANGLE:
+        _show_budget(rows, readings)
     if csv is not None:
-        _write(csv, rows)
+        _write(csv, header(gauge.columns), [row.cells(gauge.columns) for row in rows])
+    if budget is not None:
+        _write(budget, BUDGET_HEADER, _budget_lines(rows, readings))
     good = {row.file for row in rows if row.accepted}
     bad = [file for file in files if file not in good]
     if bad:
         why = next(row.reason for row in rows if row.file == bad[0])
         more = f" and {len(bad) - 1} more" if len(bad) > 1 else ""
         raise VisionError(
-            f"No angle in {len(bad)} of {len(files)} files: {bad[0]}{more}. "
+            f"No {quantity.value} in {len(bad)} of {len(files)} files: {bad[0]}{more}. "
             f"{bad[0].name}: {why.rstrip('.')}."
         )
 
@@ -100,46 +147,64 @@ def _meter(camera: Path | None, ruler: Path | None, bends: Bends) -> AngleMeter:
     )
 
 
+def _angle(meter: AngleMeter, track: bool, overlay: bool) -> Gauge:
+    from rig.cli._gauges import AngleGauge
+
+    return AngleGauge(meter, track, overlay)
+
+
+def _length(
+    quantity: Quantity, meter: AngleMeter, markers: tuple[int, int], out_of_plane_u_mm: float
+) -> Gauge:
+    from rig.cli._gauges import BackboneGauge, DisplacementGauge
+    from rig.validate.picture_budget import Picturing
+
+    if meter.camera is None or meter.ruler is None:
+        raise typer.BadParameter(
+            f"a {quantity.value} in mm needs --camera and --ruler: lens, plane and scale"
+        )
+    picturing = Picturing(meter.camera, meter.ruler, out_of_plane_u_mm)
+    if quantity is Quantity.BACKBONE:
+        return BackboneGauge(meter, picturing)
+    if markers[0] == markers[1]:
+        raise typer.BadParameter(f"--markers are two, got {markers[0]} twice")
+    return DisplacementGauge(picturing, *markers)
+
+
 def _measure(
-    files: list[Path], meter: AngleMeter, overlay: Path | None, track: bool
-) -> Iterator[Row]:
-    """Rows of all frames; overlays are written on the way."""
-    from rig.vision.overlay import draw_overlay
-    from rig.vision.table import row_of, unreadable_row
+    files: list[Path], gauge: Gauge, overlay: Path | None
+) -> Iterator[tuple[Row, Reading]]:
+    """Rows of all frames with what they are from; overlays are written on the way."""
+    from dataclasses import replace
+
+    from rig.vision.table import Row
 
     names = _overlay_names(files)
-    for file in files:
-        for outcome in _outcomes(file, meter, track):
-            if isinstance(outcome, str):
-                yield unreadable_row(file, outcome)
-                continue
-            frame, result = outcome
-            if overlay is not None:
-                name = names[file] + ("" if frame.time_s is None else f"_{frame.index:06d}")
-                _save(overlay / f"{name}.png", draw_overlay(frame.image, result))
-            yield row_of(file, frame.index, frame.time_s, result)
+    for file, frame, reading in _readings(files, gauge):
+        number = time_s = None
+        if frame is not None:
+            number, time_s = frame.index, frame.time_s
+        if overlay is not None and reading.overlay is not None:
+            name = names[file] + ("" if time_s is None else f"_{number:06d}")
+            _save(overlay / f"{name}.png", reading.overlay)
+        row = Row(file, number, time_s, reading.values, reading.accepted, reading.reason)
+        yield row, replace(reading, overlay=None)  # pictures of a film do not fit into memory
 
 
-def _outcomes(
-    file: Path, meter: AngleMeter, track: bool
-) -> Iterator[tuple[Frame, AngleMeasurement] | str]:
-    """Measured frames; why the file cannot be read (further), where it cannot."""
+def _readings(files: list[Path], gauge: Gauge) -> Iterator[tuple[Path, Frame | None, Reading]]:
+    """Frames with their readings; none where a file cannot be read (further), but the reason."""
+    from rig.cli._gauges import Reading
     from rig.vision.errors import VisionError
     from rig.vision.footage import read_frames
 
-    tracker = None
-    if track:
-        from rig.vision.track import AngleTracker  # imports slowly
-
-        tracker = AngleTracker(meter)
-    try:
-        for frame in read_frames(file):
-            if tracker is None or frame.time_s is None:
-                yield frame, meter.measure(frame.image)
-            else:
-                yield frame, tracker.measure(frame.image, frame.time_s).measurement
-    except VisionError as error:
-        yield str(error)
+    still = gauge.film()  # all stills are one series
+    for file in files:
+        film = gauge.film()
+        try:
+            for frame in read_frames(file):
+                yield file, frame, (still if frame.time_s is None else film)(frame)
+        except VisionError as error:
+            yield file, None, Reading((None,) * len(gauge.columns), False, str(error))
 
 
 def _overlay_names(files: list[Path]) -> dict[Path, str]:
@@ -153,7 +218,7 @@ def _overlay_names(files: list[Path]) -> dict[Path, str]:
     return names
 
 
-def _progress(rows: Iterator[Row], files: int) -> Iterator[Row]:
+def _progress(rows: Iterator[tuple[Row, Reading]], files: int) -> Iterator[tuple[Row, Reading]]:
     """The same rows, with a bar on stderr where that is a terminal."""
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
@@ -170,27 +235,31 @@ def _progress(rows: Iterator[Row], files: int) -> Iterator[Row]:
         transient=True,
     ) as bar:
         task = bar.add_task("measuring", total=None)
-        for row in rows:
+        for row, reading in rows:
             seen.add(row.file)
             count += 1
             bar.update(task, description=f"frame {count}, file {len(seen)} of {files}")
-            yield row
+            yield row, reading
 
 
-def _show(rows: list[Row]) -> None:
+def _show(rows: list[Row], columns: Sequence[Column]) -> None:
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
     table = Table()
+    value, u95 = columns[:2]
     if len(rows) <= MAX_SHOWN:
-        headings = ("file", "frame", "time\ns", "angle\ndeg", "u95\ndeg", "quality", "")
-        lines = [_line(row) for row in rows]
+        headings = ["file", "frame", "time\ns", *(f"{c.heading}\n{c.unit}" for c in columns), ""]
+        lines = [_line(row, columns) for row in rows]
     else:
-        headings = ("file", "frames", "accepted", "lowest\ndeg", "highest\ndeg", "u95\ndeg", "")
-        lines = [_summary(file, rows) for file in dict.fromkeys(row.file for row in rows)]
+        ends = (f"{name}\n{value.unit}" for name in ("lowest", "highest"))
+        headings = ["file", "frames", "accepted", *ends, f"u95\n{u95.unit}", ""]
+        files = dict.fromkeys(row.file for row in rows)
+        lines = [_summary(file, rows, columns) for file in files]
     for index, heading in enumerate(headings):
-        table.add_column(heading, justify="left" if index in (0, 6) else "right")
+        justify: Literal["left", "right"] = "left" if index in (0, len(headings) - 1) else "right"
+        table.add_column(heading, justify=justify)
     for line in lines:
         table.add_row(*(Text(cell) for cell in line))  # names may hold what rich calls markup
     Console().print(table)
@@ -198,35 +267,64 @@ def _show(rows: list[Row]) -> None:
     typer.echo(f"{accepted} of {len(rows)} frames accepted")
 
 
-def _line(row: Row) -> tuple[str, ...]:
+def _line(row: Row, columns: Sequence[Column]) -> tuple[str, ...]:
     return (
         row.file.name,
         "" if row.frame is None else str(row.frame),
         "" if row.time_s is None else f"{row.time_s:.3f}",
-        "" if row.angle_deg is None else f"{row.angle_deg:.2f}",
-        "" if row.u95_deg is None else f"{row.u95_deg:.2f}",
-        f"{row.quality:.2f}" if row.accepted else "",
+        *row.shown(columns),
         row.reason,
     )
 
 
-def _summary(file: Path, rows: list[Row]) -> tuple[str, ...]:
+def _summary(file: Path, rows: list[Row], columns: Sequence[Column]) -> tuple[str, ...]:
     from statistics import median
 
     own = [row for row in rows if row.file == file]
-    angles = [row.angle_deg for row in own if row.angle_deg is not None]
-    spreads = [row.u95_deg for row in own if row.u95_deg is not None]
+    values, spreads = ([row.values[index] for row in own if row.accepted] for index in (0, 1))
+    found = [value for value in values if value is not None]
+    u95 = [spread for spread in spreads if spread is not None]
     reasons = [row.reason for row in own if row.reason]
     frequent = max(dict.fromkeys(reasons), key=reasons.count, default="")
+    shown = columns[0].shown
     return (
         file.name,
         str(len(own)),
-        str(len(angles)),
-        f"{min(angles):.2f}" if angles else "",
-        f"{max(angles):.2f}" if angles else "",
-        f"{median(spreads):.2f}" if spreads else "",
+        str(len(found)),
+        f"{min(found):.{shown}f}" if found else "",
+        f"{max(found):.{shown}f}" if found else "",
+        f"{median(u95):.{shown}f}" if u95 else "",
         f"{len(reasons)} rejected, mostly: {frequent}" if frequent else "",
     )
+
+
+def _show_budget(rows: list[Row], readings: list[Reading]) -> None:
+    """The budget of the frame with the largest value, which is where lengths are least known."""
+    from rich.console import Console
+    from rich.table import Table
+
+    accepted = [pair for pair in zip(rows, readings, strict=True) if pair[1].accepted]
+    if not accepted:
+        return
+    row, reading = max(accepted, key=lambda pair: abs(pair[1].values[0] or 0.0))
+    for name, lines in reading.budgets.items():
+        table = Table(title=f"{name} in {row.file.name}, frame {row.frame}")
+        for heading in ("source", "type", "u", "unit", "contribution"):
+            table.add_column(heading, justify="left" if heading in ("source", "unit") else "right")
+        for c in lines:
+            table.add_row(c.name, c.kind, f"{c.u:.2g}", c.unit, f"{c.contribution:.2g}")
+        Console().print(table)
+
+
+def _budget_lines(rows: list[Row], readings: list[Reading]) -> Iterator[tuple[str, ...]]:
+    for row, reading in zip(rows, readings, strict=True):
+        for name, lines in reading.budgets.items():
+            for c in lines:
+                numbers = (c.u, c.sensitivity, c.contribution, c.dof)
+                yield (
+                    *(str(row.file), str(row.frame), name, c.name, c.kind, c.unit),
+                    *(f"{number:.6g}" for number in numbers),
+                )
 
 
 def _make_folder(folder: Path) -> None:
@@ -252,17 +350,16 @@ def _save(path: Path, image: Image) -> None:
         raise VisionError(f"{path} cannot be written: {error.strerror}.") from None
 
 
-def _write(path: Path, rows: list[Row]) -> None:
+def _write(path: Path, header: Sequence[str], lines: Iterable[Sequence[str]]) -> None:
     import csv
 
     from rig.vision.errors import VisionError
-    from rig.vision.table import COLUMNS
 
     try:
         with path.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
-            writer.writerow(COLUMNS)
-            writer.writerows(row.cells() for row in rows)
+            writer.writerow(header)
+            writer.writerows(lines)
     except OSError as error:
         raise VisionError(
             f"The table cannot be written to {path}: {error.strerror}. Name a file in an existing "

@@ -1,9 +1,9 @@
 """The backbone of a bent actuator from its silhouette: radius, angle, and how round it is.
 
 The backbone is the free edge of the flat layer, which keeps its length: the smooth one of the two
-long sides of the soft body between connector and cap. A circle is fitted to it in the plane of the
-ruler, in the parameters of Pratt (SIGGRAPH 1987): curvature, direction and distance, so that a
-straight actuator is no special case.
+long sides of the soft body between connector and cap. A circle through the pixels of its rim gives
+the normals along which the edge is then found to a fraction of a pixel; the backbone is the circle
+through those places, in the plane of the ruler.
 """
 
 from __future__ import annotations
@@ -12,20 +12,28 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from scipy.optimize import least_squares
 
+from rig.vision.circle import fit_circle
+from rig.vision.edges import crossings
 from rig.vision.errors import UntrustedFrameError, VisionError
 from rig.vision.lines import FloatArray
 from rig.vision.measure import Sighting
+from rig.vision.parts import SMALL_RAD, SeenParts, sheared
+from rig.vision.plane import PicturePlane
 from rig.vision.segment import Image
 
 MIN_YELLOWNESS = 8.0  # grey levels: the print against neutral surroundings
 KEPT_SHARE = 0.5  # of the body's own yellowness: the middle of its edges
 MAX_GAP_PX = 12.0  # a soft body whose nearest pixel is further from a rigid part is another thing
 NEAR_PX = 4.0  # contour so much further from a rigid part than its nearest pixel is at the joint
-LOOSE_MM = 0.2  # beyond which points pull less: a dent, a thread
+LOOSE_PX = 2.0  # the rim of a silhouette is jagged by whole pixels
 END_SHARE = 0.12  # of the chain at each end: end walls are rigid, and blue shines into them
 MIN_POINTS = 30
+RIM_U_PX = 0.3
+"""Standard uncertainty of where the edge of a translucent body is across, alike all along it, seen
+on rendered pictures."""
+MIDDLE_U_PX = 0.15
+"""Standard uncertainty of the middle of a rigid part, as its blue pixels tell it; likewise."""
 
 
 @dataclass(frozen=True)
@@ -40,11 +48,22 @@ class Backbone:
     """Turn of the circle from the middle of the connector to that of the cap."""
     residual_mm: float
     """RMS distance of the edge from the circle: what is not constant curvature, and noise."""
+    residual_dof: float
+    """Degrees of freedom of that, of the points that count as independent."""
+    curvature_parts: SeenParts
+    """What the picture tells of the curvature's uncertainty, per mm."""
+    angle_parts: SeenParts
+    """The same of the angle, in deg."""
 
     @property
     def radius_mm(self) -> float:
         """Without limit for a straight actuator."""
         return np.inf if self.curvature_per_mm == 0.0 else 1.0 / self.curvature_per_mm
+
+    @property
+    def residual_u_mm(self) -> float:
+        """Standard uncertainty of the residual: that of a standard deviation (GUM E.4.3)."""
+        return self.residual_mm / float(np.sqrt(2.0 * self.residual_dof))
 
 
 def fit_backbone(image_bgr: Image, seen: Sighting) -> Backbone:
@@ -55,20 +74,76 @@ def fit_backbone(image_bgr: Image, seen: Sighting) -> Backbone:
     """
     if seen.plane.rectification is None:
         raise VisionError("A backbone needs the ruler in the frame: without it there is no scale.")
-    chain = _free_edge(_body(image_bgr, seen), seen)
+    body = _body(image_bgr, seen)
+    chain = _free_edge(body, seen)
     trim = round(END_SHARE * len(chain))
-    pixels = chain[trim : len(chain) - trim]
-    if len(pixels) < MIN_POINTS:
+    rim = chain[trim : len(chain) - trim]
+    if len(rim) < MIN_POINTS:
         raise UntrustedFrameError("no long side of a soft body between connector and end cap")
-    points = seen.plane.places_mm(pixels)
-    ends = seen.plane.places_mm(np.stack([seen.connector.centroid, seen.cap.centroid]))
-    circle = _circle(points)
+    outwards = fit_circle(rim, LOOSE_PX).outwards(rim, body.mean(axis=0))
+    edge = crossings(image_bgr, rim, outwards)
+    if len(edge) < MIN_POINTS:
+        raise UntrustedFrameError("the edge of the soft body is too faint")
+    return _measured(seen.plane, edge, np.stack([seen.connector.centroid, seen.cap.centroid]))
+
+
+def _measured(plane: PicturePlane, edge: FloatArray, middles: FloatArray) -> Backbone:
+    """The circle through `edge` (n, 2) px and its turn from one of the `middles` (2, 2) px on."""
+    rectification = plane.rectification
+    assert rectification is not None
+    points, ends = plane.places_mm(edge), plane.places_mm(middles)
+    circle = fit_circle(points)
+
+    def elsewhere(points_there: FloatArray, ends_there: FloatArray) -> tuple[float, float]:
+        """Curvature per mm and turn in rad, unsigned, of points that are a little elsewhere."""
+        moved = circle.moved(points, points_there)
+        return _sign(circle.curvature) * moved.curvature, _sign(turn) * moved.turn(ends_there)
+
+    covariance, dof = circle.covariance(points)
+    turn, by_values = circle.turn(ends), circle.turn_gradient(ends)
+    planes = zip(plane.varied_places_mm(edge), plane.varied_places_mm(middles), strict=True)
+    varied = np.array([elsewhere(*places) for places in planes])
+    by_marks = varied[1:] - varied[0]
+    by_lean = np.subtract(
+        elsewhere(sheared(points, SMALL_RAD), sheared(ends, SMALL_RAD)), varied[0]
+    )
+    across = plane.scale_mm_per_px(edge[len(edge) // 2])
+    assert across is not None
+    length = float(np.hypot(*np.diff(points, axis=0).T).sum())
+    curvature, distance = abs(circle.curvature), plane.distance_mm(edge[len(edge) // 2])
     return Backbone(
         points_mm=points,
-        curvature_per_mm=abs(circle.curvature),
-        angle_deg=float(np.degrees(circle.turn(*ends))),
-        residual_mm=float(np.sqrt((circle.off**2).mean())),
+        curvature_per_mm=curvature,
+        angle_deg=float(np.degrees(abs(turn))),
+        residual_mm=float(np.sqrt((circle.off(points) ** 2).mean())),
+        residual_dof=dof,
+        curvature_parts=SeenParts(
+            scatter_u=float(np.sqrt(covariance[0, 0])),
+            scatter_dof=dof,
+            marks_u=rectification.u_of(by_marks[:, 0]),
+            marks_dof=rectification.degrees_of_freedom,
+            pixel_u=curvature**2 * RIM_U_PX * across,  # d(1/R) = dR / R^2
+            scale=-curvature,
+            shear=float(by_lean[0]) / SMALL_RAD,
+            lens=float(np.hypot(curvature, 1.0 / length)),  # strained, and bent from end to end
+            distance_mm=distance,
+        ),
+        angle_parts=SeenParts(
+            scatter_u=float(np.degrees(np.sqrt(by_values @ covariance @ by_values))),
+            scatter_dof=dof,
+            marks_u=float(np.degrees(rectification.u_of(by_marks[:, 1]))),
+            marks_dof=rectification.degrees_of_freedom,
+            pixel_u=float(np.degrees(np.sqrt(2.0) * MIDDLE_U_PX * across * curvature)),
+            scale=0.0,
+            shear=float(np.degrees(by_lean[1])) / SMALL_RAD,
+            lens=float(np.degrees(1.0)),
+            distance_mm=distance,
+        ),
     )
+
+
+def _sign(value: float) -> float:
+    return -1.0 if value < 0.0 else 1.0
 
 
 def _body(image: Image, seen: Sighting) -> FloatArray:
@@ -113,47 +188,3 @@ def _gaps(points: FloatArray, outline: FloatArray) -> FloatArray:
     apart = points[:, None, :] - outline[None, ::2, :]
     gaps: FloatArray = np.sqrt((apart**2).sum(axis=2).min(axis=1))
     return gaps
-
-
-@dataclass(frozen=True)
-class _Circle:
-    """Of one curvature; `distance` (mm) from `middle` (2,) in the direction of `normal` (2,)."""
-
-    curvature: float
-    distance: float
-    normal: FloatArray
-    middle: FloatArray
-    off: FloatArray  # (n,) signed distances of the points
-
-    def turn(self, first: FloatArray, second: FloatArray) -> float:
-        """Angle in rad, unsigned, between the radii through two points (2,)."""
-        one, other = (
-            self.curvature * (point - self.middle)
-            + (1.0 + self.curvature * self.distance) * self.normal
-            for point in (first, second)
-        )
-        return abs(float(np.arctan2(one[0] * other[1] - one[1] * other[0], one @ other)))
-
-
-def _circle(points: FloatArray) -> _Circle:
-    """Robust least squares of the distances (n,) of `points` (n, 2)."""
-    middle = points.mean(axis=0)
-    local = points - middle
-    across = np.linalg.svd(local, full_matrices=False)[2][1]
-    start = [0.0, float(np.arctan2(across[1], across[0])), 0.0]
-    found = least_squares(
-        lambda values: _distances(local, values), start, loss="soft_l1", f_scale=LOOSE_MM
-    )
-    curvature, heading, distance = found.x.tolist()
-    normal = np.array([np.cos(heading), np.sin(heading)])
-    return _Circle(curvature, distance, normal, middle, _distances(local, found.x))
-
-
-def _distances(points: FloatArray, values: FloatArray) -> FloatArray:
-    """Signed distances (n,) of points from the circle of curvature, heading and distance."""
-    curvature, heading, distance = values
-    along = points @ [np.cos(heading), np.sin(heading)]
-    square = (points**2).sum(axis=1) + distance**2
-    excess = 0.5 * curvature * square + (1.0 + curvature * distance) * along + distance
-    away: FloatArray = 2.0 * excess / (1.0 + np.sqrt(np.maximum(1.0 + 2.0 * curvature * excess, 0)))
-    return away

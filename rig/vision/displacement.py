@@ -6,6 +6,7 @@ the middle, mapped through lens and ruler. A marker's own pose is never asked fo
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -15,12 +16,18 @@ from rig.spec.calibration import CameraCalibration, RulerCalibration
 from rig.vision.errors import UntrustedFrameError
 from rig.vision.lines import FloatArray
 from rig.vision.motion import ConstantVelocity, require_later
+from rig.vision.parts import SMALL_RAD, SeenParts, sheared
 from rig.vision.plane import PicturePlane, rectify, require_picture
 from rig.vision.ruler import find_ruler
 from rig.vision.segment import Image, pyramid
 
 PLACE_U_PX = 0.08
-"""Standard uncertainty of a marker's place, seen on rendered films with motion blur."""
+"""Of a marker's place, for the gate: how far it may be from where it is expected."""
+PIXEL_U_PX = 0.06
+"""Standard uncertainty of a marker's place that its four corners share, as they lie alike in their
+pixels: seen on rendered films. At rest it is the same in every frame."""
+SQUARE_DOF = 4
+"""Of eight coordinates of corners place, turn and size of a square take four."""
 START_RATE_PX_S = 3000.0
 ACCELERATION_PX_S2 = 60_000.0
 GATE_SIGMAS = 5.0
@@ -38,8 +45,8 @@ class DisplacementMeasurement:
 
     displacement_mm: float | None
     """Of the moving marker from the fixed one, along their line in the first frame, since then."""
-    u_mm: float
-    """Standard uncertainty; 0 when rejected."""
+    parts: SeenParts | None
+    """Of its uncertainty, in mm; None when rejected."""
     accepted: bool
     reason: str
 
@@ -76,7 +83,7 @@ class DisplacementTracker:
         try:
             return self._measured(image_bgr, time_s)
         except UntrustedFrameError as why:
-            return DisplacementMeasurement(None, 0.0, False, str(why))
+            return DisplacementMeasurement(None, None, False, str(why))
 
     def _measured(self, image: Image, time_s: float) -> DisplacementMeasurement:
         track = self._track
@@ -90,9 +97,10 @@ class DisplacementTracker:
         if self._zero is None:
             levels = pyramid(image)
             plane = rectify(self._camera, self._ruler, find_ruler(levels, self._ruler.marks))
-            start, end = plane.places_mm(np.stack([fixed, moving]))
-            self._zero = _Zero(plane, fixed, end - start)
-        if np.hypot(*(fixed - self._zero.fixed_px)) > FIXED_MOVE_PX:
+            places = np.stack([fixed, moving])
+            start, end = plane.places_mm(places)
+            self._zero = _Zero(plane, places, end - start, _misfit(plane, corners))
+        if np.hypot(*(fixed - self._zero.places_px[0])) > FIXED_MOVE_PX:
             raise UntrustedFrameError("the marker at the fixed end has moved: so has the camera")
         side = float(np.hypot(*(corners[1][1] - corners[1][0])))
         state = (
@@ -101,8 +109,8 @@ class DisplacementTracker:
             else expected.updated(moving, np.full(2, PLACE_U_PX))
         )
         self._track = _Track(state, time_s, side)
-        displacement, u = self._zero.displacement(fixed, moving, self._ruler)
-        return DisplacementMeasurement(displacement, u, True, "")
+        displacement, parts = self._zero.displacement(np.stack([fixed, moving]), corners)
+        return DisplacementMeasurement(displacement, parts, True, "")
 
     def _corners(self, image: Image, expected: ConstantVelocity | None) -> list[FloatArray]:
         """Corners (4, 2) px of both markers: sought where they are expected, then everywhere."""
@@ -111,7 +119,7 @@ class DisplacementTracker:
             side = self._track.side_px
             reach = side * (0.5 + MARGIN_SIDES)
             moved = GATE_SIGMAS * float(expected.u.max())
-            found |= _markers(image, self._zero.fixed_px, reach)
+            found |= _markers(image, self._zero.places_px[0], reach)
             found |= _markers(image, expected.values, reach + moved)
         if any(name not in found for name in self._names):
             everywhere = 0.5 * np.array(image.shape[1::-1]), float(max(image.shape))
@@ -127,21 +135,52 @@ class _Zero:
     """What the first frame gives."""
 
     plane: PicturePlane
-    fixed_px: FloatArray
+    places_px: FloatArray  # (2, 2) of the fixed and the moving marker
     apart_mm: FloatArray  # (2,) from the fixed to the moving marker
+    misfit: float  # of their corners, mm2
 
     def displacement(
-        self, fixed: FloatArray, moving: FloatArray, ruler: RulerCalibration
-    ) -> tuple[float, float]:
-        """Displacement and standard uncertainty in mm."""
-        start, end = self.plane.places_mm(np.stack([fixed, moving]))
-        along = self.apart_mm / np.hypot(*self.apart_mm)
-        displacement = float((end - start - self.apart_mm) @ along)
-        scale = self.plane.scale_mm_per_px(moving)
+        self, places_px: FloatArray, corners: Sequence[FloatArray]
+    ) -> tuple[float, SeenParts]:
+        """Displacement in mm and what the picture tells of its uncertainty.
+
+        `places_px` (2, 2) are of the fixed and the moving marker, `corners` (4, 2) of each.
+        """
+        plane, rectification = self.plane, self.plane.rectification
+        assert rectification is not None
+        then_and_now = np.concatenate([self.places_px, places_px])
+        here = plane.places_mm(then_and_now)
+        displacement = float(self._along(here))
+        scale = plane.scale_mm_per_px(places_px[1])
         assert scale is not None
-        # two markers, in this frame and in the first one
-        places = 2.0 * PLACE_U_PX * scale
-        return displacement, float(np.hypot(places, displacement * ruler.pitch_u / ruler.pitch))
+        dof = 4 * SQUARE_DOF
+        corner_u = np.sqrt((self.misfit + _misfit(plane, corners)) / dof)
+        varied = self._along(plane.varied_places_mm(then_and_now))
+        return (
+            displacement,
+            SeenParts(
+                scatter_u=float(
+                    corner_u
+                ),  # a place is the mean of four corners, there are four places
+                scatter_dof=dof,
+                marks_u=rectification.u_of(varied[1:] - varied[0]),
+                marks_dof=rectification.degrees_of_freedom,
+                pixel_u=float(np.sqrt(2.0) * PIXEL_U_PX * scale),  # the moving marker, then and now
+                scale=displacement,
+                shear=float(self._along(sheared(here, SMALL_RAD)) - displacement) / SMALL_RAD,
+                lens=displacement,
+                distance_mm=plane.distance_mm(places_px[1]),
+            ),
+        )
+
+    def _along(self, places_mm: FloatArray) -> FloatArray:
+        """Displacement from places (..., 4, 2): fixed and moving marker, then and now."""
+        then = places_mm[..., 1, :] - places_mm[..., 0, :]
+        now = places_mm[..., 3, :] - places_mm[..., 2, :]
+        moved: FloatArray = ((now - then) * then).sum(axis=-1) / np.hypot(
+            then[..., 0], then[..., 1]
+        )
+        return moved
 
 
 @dataclass(frozen=True)
@@ -188,6 +227,19 @@ def _markers(image: Image, middle: FloatArray, reach: float) -> dict[int, FloatA
         int(name): four.reshape(4, 2).astype(np.float64) + low
         for name, four in zip(names.ravel(), corners, strict=True)
     }
+
+
+def _misfit(plane: PicturePlane, corners: Sequence[FloatArray]) -> float:
+    """Sum of squares, mm2, by which the corners (4, 2) px of markers miss squares in the plane."""
+    square = np.array([-1 - 1j, 1 - 1j, 1 + 1j, -1 + 1j])
+    total = 0.0
+    for four in corners:
+        places = plane.places_mm(four) @ [1, 1j]
+        places = places - places.mean()
+        # in a plane that is seen mirrored the corners go round the other way
+        fits = [abs(np.vdot(way, places)) ** 2 / 4 for way in (square, square.conj())]
+        total += float((abs(places) ** 2).sum() - max(fits) / 2)
+    return total
 
 
 def _crossing(corners: FloatArray) -> FloatArray:

@@ -222,6 +222,20 @@ def _refine(
     )
 
 
+def crossings(image: Image, base: FloatArray, outward: FloatArray) -> FloatArray:
+    """Where a silhouette ends along normals `outward` (n, 2) from near its rim, `base` (n, 2) px.
+
+    Places (m, 2) px half-way between the colours of both sides; normals without enough contrast
+    are left out.
+    """
+    depths = np.arange(-REACH_OUT_PX, REACH_OUT_PX + 0.5 * STEP_PX, STEP_PX)
+    profile, contrast = _profiles(image, base, outward, depths)
+    crossing, found = _half_way(profile, depths)
+    good = found & (contrast > MIN_CONTRAST)
+    places: FloatArray = base[good] + crossing[good, None] * outward[good]
+    return places
+
+
 def _normal(direction: FloatArray) -> FloatArray:
     return np.array([-direction[1], direction[0]])
 
@@ -240,9 +254,12 @@ def _profiles(
 ) -> tuple[FloatArray, FloatArray]:
     """Share of the part's colour along normals (n, depths): one inside, zero outside.
 
-    Also the contrast (n,) between the two ends, in linear light.
+    `outward` is (2,) for all points of `base` (n, 2), or (n, 2). Also the contrast (n,) between the
+    two ends, in linear light.
     """
-    grid = (base[:, None, :] + depths[None, :, None] * outward).astype(np.float32)
+    grid = (base[:, None, :] + depths[None, :, None] * np.reshape(outward, (-1, 1, 2))).astype(
+        np.float32
+    )
     colour = cv2.remap(
         image,
         np.ascontiguousarray(grid[..., 0]),

@@ -35,9 +35,8 @@ def fit_line(points: FloatArray, weights: FloatArray) -> LineFit:
     on it, as where something lies across a part of the edge.
 
     `weights` (n,) are relative prior weights. Neighbouring edge points are correlated by the
-    lens, the sensor and JPEG blocks, so the number of independent points is smaller than n; it
-    is estimated from the lag-one autocorrelation r of the residuals as n (1 - r) / (1 + r), the
-    effective sample size of an AR(1) process. Needs n >= 3.
+    lens, the sensor and JPEG blocks, so the number of independent points is smaller than n: see
+    `independent_share`. Needs n >= 3.
     """
     robust = weights.astype(np.float64).copy()
     centre, direction, offsets = plain_line(points, robust)
@@ -54,7 +53,8 @@ def fit_line(points: FloatArray, weights: FloatArray) -> LineFit:
     total = float(robust.sum())
     variance = float((robust * offsets**2).sum()) / total * len(points) / max(len(points) - 2, 1)
     spread = float((robust * along**2).sum()) / total
-    u_direction = np.sqrt(variance / max(spread, 1e-12) / len(points) * _correlation(offsets))
+    independent = len(points) * independent_share(offsets)
+    u_direction = np.sqrt(variance / max(spread, 1e-12) / independent)
     return LineFit(
         centre=centre,
         direction=direction,
@@ -90,10 +90,14 @@ def median(values: NDArray[Any]) -> float:
     return float(np.partition(values, middle)[middle])
 
 
-def _correlation(offsets: FloatArray) -> float:
-    """Variance inflation (1 + r) / (1 - r) of correlated residuals; never below one."""
+def independent_share(offsets: FloatArray) -> float:
+    """Share (1 - r) / (1 + r) of correlated residuals (n,) that count as independent.
+
+    The effective sample size of an AR(1) process with the lag-one correlation r, which is taken
+    to be between 0 and 0.95.
+    """
     energy = float(offsets @ offsets)
     if energy <= 0.0:
         return 1.0
     lag_one = min(max(float(offsets[1:] @ offsets[:-1]) / energy, 0.0), 0.95)
-    return (1.0 + lag_one) / (1.0 - lag_one)
+    return (1.0 - lag_one) / (1.0 + lag_one)

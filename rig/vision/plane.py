@@ -48,8 +48,25 @@ class Rectification:
     homography: FloatArray  # (3, 3), last entry 1
     covariance: FloatArray  # (8, 8) of the first eight entries
     residual_px: float
+    degrees_of_freedom: float
     pitch_mm: float
     squareness_u_rad: float
+
+    def varied(self) -> FloatArray:
+        """Homographies (9, 3, 3): this one, and with each entry a little off; for `u_of`."""
+        varied = np.repeat(self.homography[None], 9, axis=0)
+        varied.reshape(9, 9)[1:, :8] += np.diag(self._steps)
+        return varied
+
+    def u_of(self, changes: FloatArray) -> float:
+        """Standard uncertainty, from the marks, of what changes by (8,) in the `varied` planes."""
+        gradient = changes / self._steps
+        return float(np.sqrt(max(float(gradient @ self.covariance @ gradient), 0.0)))
+
+    @property
+    def _steps(self) -> FloatArray:
+        steps: FloatArray = 0.1 * np.sqrt(np.diag(self.covariance)) + 1e-15
+        return steps
 
 
 @dataclass(frozen=True)
@@ -84,16 +101,12 @@ class PicturePlane:
         plane = self.rectification
         if plane is None:
             return 0.0
-        steps = 0.1 * np.sqrt(np.diag(plane.covariance)) + 1e-15
-        shifted = np.repeat(self._homographies(), 9, axis=0)
-        shifted.reshape(9, 9)[1:, :8] += np.diag(steps)
-        turns = _turns(shifted, first, second)
-        gradient = ((turns[1:] - turns[0] + np.pi / 2) % np.pi - np.pi / 2) / steps
-        marks = float(gradient @ plane.covariance @ gradient)
+        turns = _turns(plane.varied(), first, second)
+        marks = plane.u_of((turns[1:] - turns[0] + np.pi / 2) % np.pi - np.pi / 2)
         # A leg that leans by e shears the plane: directions d turn by e sin^2 d.
         here = self._homographies()
         lean = np.sin(_directions(here, second)[0]) ** 2 - np.sin(_directions(here, first)[0]) ** 2
-        return float(np.sqrt(max(marks, 0.0) + (plane.squareness_u_rad * lean) ** 2))
+        return float(np.hypot(marks, plane.squareness_u_rad * lean))
 
     def _homographies(self) -> FloatArray:
         """Plane to ideal pixels, (1, 3, 3); without a ruler they are the same."""
@@ -110,6 +123,20 @@ class PicturePlane:
         places = _to_plane(self._homographies(), self.undistort(pixels))[0]
         inside: FloatArray = self.rectification.pitch_mm * places
         return inside
+
+    def varied_places_mm(self, pixels: FloatArray) -> FloatArray:
+        """`places_mm` (9, n, 2) in each of the planes of `Rectification.varied`."""
+        assert self.rectification is not None
+        places = _to_plane(self.rectification.varied(), self.undistort(pixels))
+        varied: FloatArray = self.rectification.pitch_mm * places
+        return varied
+
+    def distance_mm(self, pixel: FloatArray) -> float:
+        """Of the camera from the plane at `pixel` (2,); infinite without a lens or a ruler."""
+        scale = self.scale_mm_per_px(pixel)
+        if self.camera is None or scale is None:
+            return np.inf
+        return scale * float(np.sqrt(self.camera.focal_x * self.camera.focal_y))
 
     def scale_mm_per_px(self, pixel: FloatArray) -> float | None:
         """Size of a pixel at `pixel` (2,), mm; None without a ruler."""
@@ -160,6 +187,7 @@ def rectify(
             homography=np.append(parameters, 1.0).reshape(3, 3),
             covariance=variance * _normal_inverse(jacobian),
             residual_px=residual,
+            degrees_of_freedom=float(max(freedom, 1)),
             pitch_mm=ruler.pitch * 1e3,
             squareness_u_rad=float(np.radians(ruler.squareness_u_deg)),
         ),

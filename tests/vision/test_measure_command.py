@@ -10,11 +10,14 @@ import cv2
 import numpy as np
 import pytest
 
+from rig.spec.calibration_file import calibration_text
 from rig.vision.errors import VisionError
 from rig.vision.footage import expand, read_frames
-from rig.vision.table import COLUMNS
+from rig.vision.table import ANGLE, header
 from tests.cli.conftest import rig  # noqa: F401
 from tests.vision.synthetic import Scene, render
+from tests.vision.test_displacement import CAMERA, film_of, still_outlines, stroke_mm
+from tests.vision.test_track import camera, frame
 
 CALIBRATIONS = (
     "kind: calibration\ninstrument: {instrument}\n{fields}\nprovenance:\n"
@@ -66,7 +69,7 @@ def test_images_of_a_folder_become_rows_in_natural_order(rig, folder, tmp_path):
     table = tmp_path / "angles.csv"
     outcome = rig("measure", folder, "--csv", table)
     assert outcome.code == 0, outcome.err
-    assert table.read_text().splitlines()[0] == ",".join(COLUMNS)
+    assert table.read_text().splitlines()[0] == ",".join(header(ANGLE))
     rows = rows_of(table)
     assert [Path(row["file"]).name for row in rows] == ["frame_9.png", "frame_10.png"]
     assert [float(row["angle_deg"]) for row in rows] == pytest.approx([10.0, 60.0], abs=1.0)
@@ -125,6 +128,77 @@ def test_a_followed_video_rejects_an_angle_that_jumps(rig, tmp_path, pictures): 
     assert [float(row["angle_deg"]) for row in steady] == pytest.approx(3 * [10.0], abs=1.0)
     assert jumped["accepted"] == "false"
     assert "the angle jumps to" in jumped["reason"]
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> tuple[str | Path, ...]:
+    """Options that name the calibrations of the virtual bench's lens and ruler."""
+    folder = Path(__file__).parents[2] / "calibration"
+    return (
+        *("--camera", folder / "camera-virtual.yaml"),
+        *("--ruler", folder / "ruler-virtual.yaml"),
+    )
+
+
+def test_a_backbone_comes_with_its_budget(rig, lab, tmp_path):  # noqa: F811
+    cv2.imwrite(str(tmp_path / "bent.png"), frame(camera(4), 60.0))
+    table, budget = tmp_path / "backbone.csv", tmp_path / "budget.csv"
+    command = ("measure", tmp_path / "bent.png", "--quantity", "backbone", *lab)
+    outcome = rig(*command, "--csv", table, "--budget", budget)
+    assert outcome.code == 0, outcome.err
+    (row,) = rows_of(table)
+    radius, u95 = float(row["radius_mm"]), float(row["u95_radius_mm"])
+    assert abs(radius - 66.0 / np.radians(60.0)) < u95 < 0.02 * radius
+    assert float(row["curvature_per_m"]) == pytest.approx(1e3 / radius, rel=1e-4)
+    assert 60.0 < float(row["bend_angle_deg"]) < 70.0
+    assert 0.0 < float(row["u95_residual_mm"]) < float(row["residual_mm"]) < 0.05
+    lines = rows_of(budget)
+    assert {line["quantity"] for line in lines} == {"bend_angle_deg", "curvature_per_mm"}
+    angle = [float(x["contribution"]) for x in lines if x["quantity"] == "bend_angle_deg"]
+    assert float(row["u95_bend_angle_deg"]) == pytest.approx(2.0 * np.linalg.norm(angle), rel=0.05)
+    assert "ruler pitch" in outcome.out
+
+
+def test_the_radius_of_a_straight_actuator_is_not_told(rig, lab, tmp_path):  # noqa: F811
+    cv2.imwrite(str(tmp_path / "straight.png"), frame(camera(4), 0.0))
+    table = tmp_path / "backbone.csv"
+    outcome = rig(
+        *("measure", tmp_path / "straight.png", "--quantity", "backbone", *lab, "--csv", table)
+    )
+    assert outcome.code == 0, outcome.err
+    (row,) = rows_of(table)
+    assert row["radius_mm"] == row["u95_radius_mm"] == ""
+    assert float(row["curvature_per_m"]) < float(row["u95_curvature_per_m"])
+
+
+def test_displacement_counts_from_the_first_of_the_images(rig, lab, tmp_path):  # noqa: F811
+    taken = film_of(still_outlines())
+    for number, time_s in enumerate((0.0, 0.2)):
+        cv2.imwrite(str(tmp_path / f"take-{number}.png"), taken(time_s))
+    calibrated = tmp_path / "lens.yaml"
+    calibrated.write_text(calibration_text(CAMERA))
+    table = tmp_path / "displacement.csv"
+    command = ("measure", tmp_path / "*.png", "--quantity", "displacement", "--csv", table)
+    outcome = rig(*command, "--camera", calibrated, *lab[2:], "--out-of-plane-u-mm", "0.2")
+    assert outcome.code == 0, outcome.err
+    first, second = rows_of(table)
+    assert float(first["displacement_mm"]) == pytest.approx(0.0, abs=1e-9)
+    off = float(second["displacement_mm"]) - stroke_mm(0.2)
+    assert abs(off) < float(second["u95_mm"]) < 0.2
+    vague = rig(*command, "--camera", calibrated, *lab[2:], "--out-of-plane-u-mm", "5")
+    assert vague.code == 0
+    assert float(rows_of(table)[1]["u95_mm"]) > 0.3
+
+
+def test_lengths_need_lens_and_ruler_and_two_markers(rig, lab, folder):  # noqa: F811
+    for wrong in (
+        ("--quantity", "backbone"),
+        ("--quantity", "displacement", *lab[:2]),
+        ("--quantity", "displacement", *lab, "--markers", "3", "3"),
+        ("--quantity", "backbone", *lab, "--track"),
+        ("--budget", "b.csv"),
+    ):
+        assert rig("measure", folder, *wrong).code == 2, wrong
 
 
 def test_an_image_without_actuator_exits_non_zero_with_the_reason(rig, tmp_path):  # noqa: F811

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from rig.plant.camera import CameraFault, VirtualCamera
+from rig.spec.calibration import RulerCalibration
 from rig.spec.workspace import Workspace
 from rig.vision.errors import VisionError
 from rig.vision.measure import AngleMeter
@@ -23,10 +24,10 @@ ANGLES = 40.0 + 15.0 * (1.0 - np.cos(np.linspace(0.0, np.pi, 12)))
 """Degrees; 164 deg/s at the fastest."""
 
 
-def camera(seed: int = 3) -> VirtualCamera:
+def camera(seed: int = 3, ruler: RulerCalibration = CALIBRATIONS.ruler) -> VirtualCamera:
     return VirtualCamera(
         BENCH.virtual.optics,
-        CALIBRATIONS.ruler,
+        ruler,
         LIBRARY.actuator("bellow-bending").geometry,
         BENCH.camera.jpeg_quality,
         np.random.default_rng(seed),
