@@ -119,8 +119,58 @@ class BellowAxisymmetricGeometry(SpecModel):
         return self
 
 
+class BellowJointGeometry(SpecModel):
+    """Joint bellow of Guo et al. (Biocybern. Biomed. Eng. 40 (2020) 1359); in metres.
+
+    V-shaped bellows between two discs, blow-moulded, so that the wall is equally thick. Radii and
+    roundings are those of the middle of the wall. The paper's text gives the number of bellows
+    alone, its figure 2 the rest: all other values here are ours, see docs/validation/guo2020.md.
+    """
+
+    family: Literal["bellow-joint"]
+    bellow_number: Count = Field(14, le=1000, description="V-shaped bellows, trough to trough")
+    pitch: Length = Field(0.003, gt=0, description="height of one bellow")
+    trough_radius: Length = Field(0.003, gt=0, description="smallest radius of the wall's middle")
+    crest_radius: Length = Field(0.0057, gt=0, description="largest radius of the wall's middle")
+    rounding: Length = Field(0.0004, gt=0, description="radius of arcs at troughs and crests")
+    wall_thickness: Length = Field(0.0003, gt=0, description="t, normal to the wall")
+    end_thickness: Length = Field(0.001, gt=0, description="of the discs at both ends")
+
+    @property
+    def cavity_radius(self) -> float:
+        """Largest radius of the cavity in metres."""
+        return self.crest_radius - self.wall_thickness / 2
+
+    @model_validator(mode="after")
+    def _describes_a_solid(self) -> BellowJointGeometry:
+        t, rounding = self.wall_thickness * 1e3, self.rounding * 1e3
+        depth = (self.crest_radius - self.trough_radius) * 1e3
+        half = self.pitch * 1e3 / 2
+        problems = []
+        if self.trough_radius <= self.wall_thickness / 2:
+            problems.append(
+                f"the troughs leave no cavity: t / 2 = {t / 2:.3g} mm must be below trough_radius "
+                f"= {self.trough_radius * 1e3:.3g} mm; reduce wall_thickness or increase "
+                f"trough_radius"
+            )
+        if rounding <= t / 2:
+            problems.append(
+                f"the wall does not fit round the arcs: rounding = {rounding:.3g} mm must be above "
+                f"t / 2 = {t / 2:.3g} mm; increase rounding or reduce wall_thickness"
+            )
+        if depth <= 2 * rounding or half <= 2 * rounding:
+            problems.append(
+                f"the flanks have no room: twice the rounding, {2 * rounding:.3g} mm, must be "
+                f"below crest_radius - trough_radius = {depth:.3g} mm and below half the pitch, "
+                f"{half:.3g} mm; reduce rounding"
+            )
+        require(not problems, "; ".join(problems))
+        return self
+
+
 Geometry = Annotated[
-    BellowBendingGeometry | BellowAxisymmetricGeometry, Field(discriminator="family")
+    BellowBendingGeometry | BellowAxisymmetricGeometry | BellowJointGeometry,
+    Field(discriminator="family"),
 ]
 
 

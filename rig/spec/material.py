@@ -83,8 +83,21 @@ class RelaxationSpec(SpecModel):
         return self
 
 
+class PlasticitySpec(SpecModel):
+    """Flow after von Mises at a yield stress that grows with the equivalent plastic strain.
+
+    Elastic strains are logarithmic then, of Young's modulus and Poisson's ratio alone.
+    """
+
+    yield_stress: Strength = Field(gt=0, description="s0, true stress")
+    hardening_modulus: Modulus = Field(
+        0.0, ge=0, description="H, of true stress over plastic strain; 0 is perfectly plastic"
+    )
+    source: str = Field(min_length=3)
+
+
 class MaterialSpec(SpecModel):
-    """An elastomer as the models need it."""
+    """An elastomer or a soft thermoplastic as the models need it."""
 
     kind: Literal["material"]
     name: Label
@@ -98,4 +111,16 @@ class MaterialSpec(SpecModel):
         None,
         description="energy at large strain; without it, neo-Hookean from the two constants",
     )
+    plasticity: PlasticitySpec | None = Field(
+        None, description="what stays of a large strain; without it, nothing does"
+    )
     relaxation: RelaxationSpec | None = None
+
+    @model_validator(mode="after")
+    def _one_elasticity(self) -> MaterialSpec:
+        require(
+            self.plasticity is None or self.hyperelastic is None,
+            "expected 'hyperelastic' or 'plasticity', not both: what flows has the elastic strains "
+            "of its two constants; remove one of the sections",
+        )
+        return self

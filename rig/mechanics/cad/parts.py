@@ -17,7 +17,13 @@ from numpy.typing import NDArray
 from rig.mechanics.bellow import INLET_RADIUS, BellowShape
 from rig.mechanics.cad.construct import Arc, Combined, Line, Part, Point, Prism, Revolved
 from rig.mechanics.mesh.bellow_axisymmetric import AxisymmetricBellow
-from rig.spec.actuator import BellowAxisymmetricGeometry, BellowBendingGeometry, Geometry
+from rig.mechanics.mesh.bellow_joint import JointBellow
+from rig.spec.actuator import (
+    BellowAxisymmetricGeometry,
+    BellowBendingGeometry,
+    BellowJointGeometry,
+    Geometry,
+)
 
 _NO_FLANK = 1e-9
 """Flanks shorter than this are left out, metres."""
@@ -31,6 +37,8 @@ def parts_of(geometry: Geometry) -> tuple[Part, ...]:
         case BellowAxisymmetricGeometry():
             body = axisymmetric_soft_body(AxisymmetricBellow.of(geometry))
             return (Part("soft", body, is_soft=True),)
+        case BellowJointGeometry():
+            return (Part("soft", joint_soft_body(JointBellow.of(geometry)), is_soft=True),)
 
 
 def _bending_parts(shape: BellowShape) -> tuple[Part, ...]:
@@ -67,6 +75,46 @@ def axisymmetric_soft_body(shape: AxisymmetricBellow) -> Combined:
         added=(Revolved(_scalloped(shape, shape.radius, shape.height), axis="z"),),
         removed=(Revolved(_scalloped(shape, inner, under), axis="z"),),
     )
+
+
+def joint_soft_body(shape: JointBellow) -> Combined:
+    """Bellows between two discs, on z = 0 the lower one's inner face, open below by an inlet.
+
+    The paper does not show its inlet: here it goes through the lower disc along the axis.
+    """
+    outer, inner = (_zigzag(shape, side * shape.wall / 2) for side in (1, -1))
+    low, high = outer[0].start[1], shape.length + shape.end
+    ends = (Line((-shape.end, low), (0.0, low)), Line((shape.length, low), (high, low)))
+    inlet = (Line((-shape.end, INLET_RADIUS), (0.0, INLET_RADIUS)),)
+    return Combined(
+        added=(Revolved((ends[0], *outer, ends[1]), axis="z"),),
+        removed=(Revolved(inner, axis="z"), Revolved(inlet, axis="z")),
+    )
+
+
+def _zigzag(shape: JointBellow, offset: float) -> tuple[Line | Arc, ...]:
+    """Profile of all bellows, `offset` outwards of the middle of the wall."""
+    arc = shape.rounding * shape.flank_angle / shape.meridian
+    fractions = np.array([0.0, arc / 2, arc, 1 - arc, 1 - arc / 2, 1.0])
+    up = [(float(z), float(r)) for r, z in shape.half(fractions, offset)]
+    down = [(shape.pitch - z, r) for z, r in reversed(up)]
+    one = [kind for half in (up, down) for kind in _half_zigzag(half)]
+    return tuple(
+        _moved(piece, number * shape.pitch) for number in range(shape.bellows) for piece in one
+    )
+
+
+def _half_zigzag(points: list[Point]) -> tuple[Arc, Line, Arc]:
+    return (
+        Arc(points[0], points[1], points[2]),
+        Line(points[2], points[3]),
+        Arc(points[3], points[4], points[5]),
+    )
+
+
+def _moved(piece: Line | Arc, along: float) -> Line | Arc:
+    """A piece of a profile further along its axis."""
+    return type(piece)(**{name: (p[0] + along, p[1]) for name, p in vars(piece).items()})
 
 
 def _connector(shape: BellowShape) -> Combined:

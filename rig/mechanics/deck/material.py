@@ -14,6 +14,7 @@ from rig.mechanics.deck.errors import DeckError
 from rig.mechanics.hyperelastic import (
     ArrudaBoyce,
     Energy,
+    Flowing,
     LogarithmicVolume,
     MooneyRivlin,
     NeoHookean,
@@ -35,7 +36,7 @@ class Hyperelasticity:
     remark: str = ""
 
 
-def hyperelasticity(distortion: Energy, volume: Volumetric) -> Hyperelasticity:
+def hyperelasticity(distortion: Energy | Flowing, volume: Volumetric) -> Hyperelasticity:
     """What stands for two energies; raises DeckError where nothing does."""
     if not isinstance(volume, QuadraticVolume | LogarithmicVolume):
         raise DeckError(f"no program's *HYPERELASTIC has the volumetric energy {volume!r}.")
@@ -49,7 +50,7 @@ def hyperelasticity(distortion: Energy, volume: Volumetric) -> Hyperelasticity:
     return Hyperelasticity(model, constants, remark)
 
 
-def _constants(distortion: Energy, d: float) -> tuple[str, tuple[float, ...]]:
+def _constants(distortion: Energy | Flowing, d: float) -> tuple[str, tuple[float, ...]]:
     match distortion:
         case NeoHookean():
             return "NEO HOOKE", (distortion.shear_modulus / 2 / _MEGAPASCAL, d)

@@ -11,6 +11,7 @@ from rig.mechanics.fe.control import (
     AngleControl,
     Control,
     DisplacementControl,
+    GasControl,
     PressureControl,
     VolumeControl,
 )
@@ -36,6 +37,7 @@ __all__ = [
     "Extremes",
     "Fields",
     "FiniteElementError",
+    "GasControl",
     "Kinematics",
     "MeshError",
     "Model",

@@ -113,7 +113,7 @@ def cauchy_stress(solid: Solid, x: Array, points: PointState) -> Array:
     f = solid.deformation_gradient(x)
     flat = f.reshape(3, 3, -1)
     j = determinant(flat, cofactor(flat))
-    stress = np.einsum("ikn,jkn->ijn", solid.law.first_piola(flat), flat) / j
+    stress = np.einsum("ikn,jkn->ijn", solid.law(points).first_piola(flat), flat) / j
     pressure = solid.pressure(x, points).reshape(-1)
     for i in range(3):
         stress[i, i] += pressure

@@ -253,6 +253,11 @@ class Model:
         held = state.x[self.held] + length * dx[self.held]
         return replace(state, x=self._constrained(x, poses, held), points=points, poses=poses)
 
+    def settled(self, state: State) -> State:
+        """The state of a step that is accepted; see `Solid.settled`."""
+        points = (s.settled(state.x, p) for s, p in zip(self.solids, state.points, strict=True))
+        return replace(state, points=tuple(points))
+
     def blended(self, states: Sequence[State], weights: Array, motion: float) -> Placement:
         """Displacements and poses of a weighted sum of states, supports moved by `motion`.
 

@@ -20,7 +20,7 @@ from rig.mechanics.fe.coordinates import blend
 from rig.mechanics.fe.linear import LinearSolver, default_solver
 from rig.mechanics.fe.model import Assembly, Model
 from rig.mechanics.fe.newton import Clock, Iteration, Options, Outcome, Target, solve_step
-from rig.mechanics.fe.state import PointState, State
+from rig.mechanics.fe.state import State
 
 Array = NDArray[np.float64]
 
@@ -203,7 +203,7 @@ class _Run:
         first = Target(self.control.value(situation), state.dead, state.motion)
         parameter = self._parameter(first, point)
         done, mixed, cuts = 0.0, self.options.mixed_points, 0
-        self._here = self._clean(state)
+        self._here = self.model.settled(state)
         if not self._past:
             if self._kind != "mixed":
                 self._step = min(self._step, self.options.first_step)
@@ -242,7 +242,7 @@ class _Run:
                 self.cancelled = True
                 return self._words(outcome, point, fraction, "it was cancelled")
             if outcome.converged:
-                self._here = self._clean(outcome.state)
+                self._here = self.model.settled(outcome.state)
                 self._remember(parameter(fraction), self._here)
                 self._latest = replace(outcome, state=self._here)
                 if record.solves <= _EASY:
@@ -296,7 +296,8 @@ class _Run:
         if isinstance(self.control, PressureControl):
             pressure = target.control
         points = tuple(
-            PointState(blend(weights, [p.pressure for p in parts]))
+            # what has flowed is no matter of extrapolation
+            replace(parts[-1], pressure=blend(weights, [p.pressure for p in parts]))
             for parts in zip(*(s.points for s in states), strict=True)
         )
         return State(x, points, poses, pressure, target.dead, target.motion)
@@ -312,10 +313,6 @@ class _Run:
                 for solid, p in zip(self.model.solids, state.points, strict=True)
             ),
         )
-
-    @staticmethod
-    def _clean(state: State) -> State:
-        return replace(state, points=tuple(PointState(p.pressure) for p in state.points))
 
     def _parameter(self, first: Target, point: Point) -> Callable[[float], float]:
         """What extrapolation is done along, forgetting the past where the path has a kink."""

@@ -20,7 +20,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -30,7 +30,7 @@ from rig.mechanics.fe._native import ffi, lib
 from rig.mechanics.fe.discretisation import Discretisation, Integers
 from rig.mechanics.fe.pointers import reals
 from rig.mechanics.fe.state import PointState
-from rig.mechanics.hyperelastic import Energy, Hyperelastic, Volumetric
+from rig.mechanics.hyperelastic import Energy, Flowing, Hyperelastic, Volumetric
 from rig.mechanics.hyperelastic.tensors import (
     add_cofactor_slope,
     cofactor,
@@ -96,7 +96,7 @@ class Solid:
     def __init__(
         self,
         discretisation: Discretisation,
-        distortion: Energy,
+        distortion: Energy | Flowing,
         volume: Volumetric,
         elements: Integers | None = None,
     ) -> None:
@@ -110,8 +110,8 @@ class Solid:
         d = discretisation
         self.distortion = distortion
         self.volume = volume
-        self.law: Energy = distortion if d.mixed else Hyperelastic(distortion, volume)
-        """The energy that the displacements alone carry; the pressures, if any, carry the rest."""
+        self._flowing = distortion if isinstance(distortion, Flowing) else None
+        self._elastic = None if isinstance(distortion, Flowing) else self._carried(distortion)
         self._dim = d.dim
         self._components = d.kinematics.components
         self._gradients = _unique_arrays(d.gradients, self.elements)
@@ -127,7 +127,32 @@ class Solid:
     def initial(self) -> PointState:
         """The state without stress."""
         modes = 0 if self._continuous else self._phi.shape[2]
-        return PointState(np.zeros((len(self.elements), modes)))
+        flowing = self._flowing
+        return PointState(
+            np.zeros((len(self.elements), modes)),
+            history=None if flowing is None else flowing.virgin(self._weights.shape),
+        )
+
+    def settled(self, x: Array, points: PointState) -> PointState:
+        """The points of a step that is accepted: strain and stress follow from the displacements
+        in x, and what has flowed has flowed for good."""
+        history = points.history
+        if self._flowing is not None and history is not None:
+            history = self._flowing.afterwards(history, self.deformation_gradient(x))
+        return PointState(points.pressure, history=history)
+
+    def law(self, points: PointState, chunk: slice = slice(None)) -> Energy:
+        """The energy that the displacements alone carry, in some elements whose points lie side by
+        side; the pressures, if any, carry the rest."""
+        if self._elastic is not None:
+            return self._elastic
+        assert self._flowing is not None
+        assert points.history is not None
+        history = points.history[:, chunk]
+        return self._carried(self._flowing.since(history.reshape(len(history), -1)))
+
+    def _carried(self, distortion: Energy) -> Energy:
+        return distortion if self.discretisation.mixed else Hyperelastic(distortion, self.volume)
 
     def deformation_gradient(self, x: Array) -> Array:
         """F at the quadrature points, (3, 3, elements, q), for the displacements in x."""
@@ -149,7 +174,7 @@ class Solid:
         j = determinant(flat, cofactor(flat)).reshape(p.shape)
         j_of_p, _ = volume_ratio(self.volume, p)
         conjugate = p * j_of_p - self.volume.energy(j_of_p)
-        density = self.law.energy(f) + p * j - conjugate
+        density = self.law(points).energy(flat).reshape(p.shape) + p * j - conjugate
         return float(np.sum(self._weights * density))
 
     def free_points(self, x: Array, points: PointState) -> PointState:
@@ -158,12 +183,12 @@ class Solid:
         flat = f.reshape(3, 3, -1)
         cof = cofactor(flat)
         p = self.pressure(x, points).reshape(-1)
-        first = self.law.first_piola(f).reshape(3, 3, -1) + p * cof
+        first = self.law(points).first_piola(flat) + p * cof
         inverse = _inverse(flat, cof)
-        return PointState(
-            points.pressure,
-            right_cauchy_green(flat).reshape(f.shape),
-            product(inverse, first).reshape(f.shape),
+        return replace(
+            points,
+            strain=right_cauchy_green(flat).reshape(f.shape),
+            stress=product(inverse, first).reshape(f.shape),
         )
 
     def evaluate(self, x: Array, points: PointState, tangent: bool = True) -> Evaluation:
@@ -252,7 +277,7 @@ class Solid:
             change = c.pressure + (c.pressure_slope @ du[:, :, None])[..., 0]
             modes = modes + length * change
         if points.strain is None or points.stress is None:
-            return PointState(modes)
+            return replace(points, pressure=modes)
         shape = points.strain.shape
         df = (self.deformation_gradient(x + dx) - self.deformation_gradient(x)).reshape(3, 3, -1)
         linear = product(c.gradient.swapaxes(0, 1), df)
@@ -260,10 +285,11 @@ class Solid:
         slope = np.einsum("iakln,kln->ian", c.material, product(c.inverse.swapaxes(0, 1), strain))
         dp = (self._phi @ change[:, :, None]).reshape(-1)
         stress = product(c.inverse, c.stress + slope + dp * c.cofactor)
-        return PointState(
-            modes,
-            points.strain + 2 * length * strain.reshape(shape),
-            points.stress + length * (stress.reshape(shape) - points.stress),
+        return replace(
+            points,
+            pressure=modes,
+            strain=points.strain + 2 * length * strain.reshape(shape),
+            stress=points.stress + length * (stress.reshape(shape) - points.stress),
         )
 
     def _pressure_modes(self, x: Array, points: PointState) -> Array:
@@ -288,12 +314,13 @@ class Solid:
         return f.reshape(3, 3, *f.shape[1:])
 
     def _point(self, f: Array, p: Array, points: PointState, chunk: slice, tangent: bool) -> _Point:
+        law = self.law(points, chunk)
         if points.strain is None or points.stress is None:
             cof = cofactor(f)
-            stress = self.law.first_piola(f) + p * cof
+            stress = law.first_piola(f) + p * cof
             slope = None
             if tangent:
-                slope = self.law.tangent(f)
+                slope = law.tangent(f)
                 add_cofactor_slope(slope, p, f)
             j = determinant(f, cof)
             return _Point(stress, slope, cof, j, 0.0, float(j.min()))
@@ -304,8 +331,8 @@ class Solid:
         cof = cofactor(own)
         inverse = _inverse(own, cof)
         gap = (right_cauchy_green(f) - c) / 2
-        first = self.law.first_piola(own) + p * cof
-        material = self.law.tangent(own)
+        first = law.first_piola(own) + p * cof
+        material = law.tangent(own)
         add_cofactor_slope(material, p, own)
         second = product(inverse, first)
         _add_second(material, -second)

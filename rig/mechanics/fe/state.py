@@ -21,6 +21,9 @@ class PointState:
     where strain and stress follow from the displacements."""
     stress: Array | None = None
     """Independent second Piola-Kirchhoff stress in Pa, (3, 3, elements, q), with `strain`."""
+    history: Array | None = None
+    """What a flowing material went through up to the last accepted step, (components, elements,
+    q), in its own terms; None of others."""
 
 
 @dataclass(frozen=True)

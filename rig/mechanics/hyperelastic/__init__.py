@@ -12,7 +12,7 @@ from rig.mechanics.hyperelastic.moduli import (
 )
 from rig.mechanics.hyperelastic.ogden import Ogden, OgdenTerm
 from rig.mechanics.hyperelastic.polynomial import MooneyRivlin, NeoHookean, Yeoh
-from rig.mechanics.hyperelastic.protocol import Array, Energy, Volumetric
+from rig.mechanics.hyperelastic.protocol import Array, Energy, Flowing, Volumetric
 from rig.mechanics.hyperelastic.responses import (
     Mode,
     Response,
@@ -25,12 +25,19 @@ from rig.mechanics.hyperelastic.stability import (
     logarithmic_stiffness,
     material_stability,
 )
-from rig.mechanics.hyperelastic.volumetric import LogarithmicVolume, QuadraticVolume, abaqus_volume
+from rig.mechanics.hyperelastic.volumetric import (
+    HenckyVolume,
+    LogarithmicVolume,
+    QuadraticVolume,
+    abaqus_volume,
+)
 
 __all__ = [
     "Array",
     "ArrudaBoyce",
     "Energy",
+    "Flowing",
+    "HenckyVolume",
     "Hyperelastic",
     "LinearElastic",
     "LogarithmicVolume",

@@ -28,7 +28,7 @@ def hyperelastic_from(material: MaterialSpec) -> Hyperelastic:
 
     Without a `hyperelastic` section: neo-Hookean from Young's modulus and Poisson's ratio. With
     one but without its `volume`: U = K/2 (J - 1)^2, K from the energy's own shear modulus at rest
-    and the material's Poisson's ratio.
+    and the material's Poisson's ratio. Plastic flow is none of their business.
     """
     young, poisson = material.young_modulus.value, material.poisson_ratio.value
     section = material.hyperelastic

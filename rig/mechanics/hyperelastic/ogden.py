@@ -1,9 +1,7 @@
 """Ogden's energy in principal stretches, with its exact tangent also where stretches are equal.
 
-Ogden, Proc. R. Soc. A 326 (1972) 565. The principal-axis tangent is that of Simo and Taylor,
-Comput. Methods Appl. Mech. Eng. 85 (1991) 273, but for its quotients of stress differences by
-stretch differences: these are evaluated in closed form, through expm1, so that nothing is
-perturbed, switched or lost as two stretches meet.
+Ogden, Proc. R. Soc. A 326 (1972) 565. Quotients of stress differences by stretch differences are
+evaluated in closed form, through expm1; see `principal` for what they are needed for.
 """
 
 from __future__ import annotations
@@ -14,11 +12,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.mechanics.errors import MechanicsError
+from rig.mechanics.hyperelastic.principal import (
+    PAIRS,
+    isochoric_logs,
+    log_ratios,
+    piola_of,
+    principal_axes,
+    tangent_of,
+)
 from rig.mechanics.hyperelastic.protocol import Array
-from rig.mechanics.hyperelastic.spectral import Spectrum, spectrum
-from rig.mechanics.hyperelastic.tensors import cofactor, determinant, in_blocks, sum_of_dyads
-
-_PAIRS = ((0, 1), (0, 2), (1, 2))
+from rig.mechanics.hyperelastic.spectral import spectrum
+from rig.mechanics.hyperelastic.tensors import cofactor, determinant, in_blocks
 
 
 @dataclass(frozen=True)
@@ -59,7 +63,7 @@ class Ogden:
         """W in Pa, shape (...), for F of shape (3, 3, ...); infinite where det F <= 0."""
 
         def compute(f: Array, out: Array) -> None:
-            logs = _isochoric_logs(spectrum(f).stretches)
+            logs = isochoric_logs(spectrum(f).stretches)
             value = sum(
                 2 * t.mu / t.alpha**2 * np.expm1(t.alpha * logs).sum(axis=0) for t in self.terms
             )
@@ -71,9 +75,8 @@ class Ogden:
         """P = sum over a of dW/dlambda_a n_a (x) N_a in Pa, shape (3, 3, ...)."""
 
         def compute(f: Array, out: Array) -> None:
-            axes = _axes(f)
-            stress = self._kirchhoff(_isochoric_logs(axes.stretches)) / axes.stretches
-            np.einsum("an,ian,jan->ijn", stress, axes.left, axes.right, out=out)
+            axes = principal_axes(f)
+            piola_of(axes, self._kirchhoff(isochoric_logs(axes.stretches)), out)
 
         return in_blocks(deformation_gradient, 2, compute)
 
@@ -81,23 +84,9 @@ class Ogden:
         """A = dP/dF in Pa, shape (3, 3, 3, 3, ...), with the turning of the principal axes."""
 
         def compute(f: Array, out: Array) -> None:
-            axes = _axes(f)
-            dyads = np.empty((9, 3, 3, f.shape[-1]))
-            for a in range(3):
-                np.multiply(axes.left[:, None, a], axes.right[None, :, a], out=dyads[a])
-            normal = dyads[:3].copy()
-            hessian, symmetric, skew = self._principal_tangent(axes.stretches)
-            np.einsum("abn,bijn->aijn", hessian, normal, out=dyads[:3])
-            scaled = np.empty_like(dyads)
-            scaled[:3] = normal
-            for at, (a, b) in enumerate(_PAIRS):
-                one = axes.left[:, None, a] * axes.right[None, :, b]
-                other = axes.left[:, None, b] * axes.right[None, :, a]
-                np.add(one, other, out=dyads[3 + at])
-                np.subtract(one, other, out=dyads[6 + at])
-                np.multiply(symmetric[at] / 2, dyads[3 + at], out=scaled[3 + at])
-                np.multiply(skew[at] / 2, dyads[6 + at], out=scaled[6 + at])
-            sum_of_dyads(scaled, dyads, out)
+            axes = principal_axes(f)
+            kirchhoff = self._kirchhoff(isochoric_logs(axes.stretches))
+            tangent_of(axes, kirchhoff, *self._slopes(axes.stretches), out)
 
         return in_blocks(deformation_gradient, 4, compute)
 
@@ -109,49 +98,23 @@ class Ogden:
             result += 2 * term.mu / term.alpha * (power - power.mean(axis=0))
         return result
 
-    def _principal_tangent(self, stretches: Array) -> tuple[Array, Array, Array]:
-        """d2W/dlambda_a dlambda_b (3, 3, n), and for each of `_PAIRS` S and D, (3, n).
-
-        S = (w_a - w_b) / (lambda_a - lambda_b) and D = (w_a + w_b) / (lambda_a + lambda_b), where
-        w_a = dW/dlambda_a, are the stiffnesses against shear and rotation of the two axes.
-        """
-        logs = _isochoric_logs(stretches)
-        kirchhoff = self._kirchhoff(logs)
+    def _slopes(self, stretches: Array) -> tuple[Array, Array]:
+        """Of the principal Kirchhoff stresses t: dt_a / d ln lambda_b, (3, 3, n), and
+        (t_a - t_b) / (lambda_a - lambda_b) for each of `PAIRS`, (3, n)."""
+        logs = isochoric_logs(stretches)
         by_logs = np.zeros((3, *stretches.shape))
         quotient = np.zeros_like(stretches)
-        ratios = [np.log1p((stretches[a] - stretches[b]) / stretches[b]) for a, b in _PAIRS]
+        ratios = log_ratios(stretches)
         for term in self.terms:
             power = np.exp(term.alpha * logs)
             mean = power.mean(axis=0)
             by_logs += 2 * term.mu / 3 * (mean - power[:, None] - power[None, :])
             for a in range(3):
                 by_logs[a, a] += 2 * term.mu * power[a]
-            for at, (_, b) in enumerate(_PAIRS):
+            for at, (_, b) in enumerate(PAIRS):
                 slope = _power_quotient(term.alpha, ratios[at]) / stretches[b]
                 quotient[at] += 2 * term.mu / term.alpha * power[b] * slope
-        symmetric, skew = np.empty_like(quotient), np.empty_like(quotient)
-        for at, (a, b) in enumerate(_PAIRS):
-            x, y = stretches[a], stretches[b]
-            symmetric[at] = (quotient[at] - kirchhoff[b] / y) / x
-            skew[at] = (kirchhoff[a] / x + kirchhoff[b] / y) / (x + y)
-        for a in range(3):
-            by_logs[a, a] -= kirchhoff[a]
-        by_logs /= stretches[:, None] * stretches[None, :]
-        return by_logs, symmetric, skew
-
-
-def _axes(f: Array) -> Spectrum:
-    """Spectrum with stretches that are not a number where det F <= 0: no stress there."""
-    axes = spectrum(f)
-    sound = determinant(f, cofactor(f)) > 0
-    return axes._replace(stretches=np.where(sound, axes.stretches, np.nan))
-
-
-def _isochoric_logs(stretches: Array) -> Array:
-    """ln(J^(-1/3) lambda_a), (3, n)."""
-    logs: Array = np.log(stretches)
-    logs -= logs.mean(axis=0)
-    return logs
+        return by_logs, quotient
 
 
 def _power_quotient(alpha: float, x: Array) -> Array:

@@ -5,7 +5,7 @@ Tensors come first, points last: a deformation gradient is (3, 3, ...), whatever
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,4 +47,26 @@ class Volumetric(Protocol):
 
     def stiffness(self, volume_ratio: Array, /) -> Array:
         """d2U/dJ2, in Pa; the bulk modulus at J = 1."""
+        ...
+
+
+@runtime_checkable
+class Flowing(Protocol):
+    """A material whose stress depends on what it went through: a new `Energy` for every step.
+
+    Its history is an array (components, ...) of the points' shape, kept by whoever keeps the points
+    and replaced when a step is accepted, never while one is looked for.
+    """
+
+    def virgin(self, shape: tuple[int, ...], /) -> Array:
+        """The history of points of a shape that nothing has happened to, (components, *shape)."""
+        ...
+
+    def since(self, history: Array, /) -> Energy:
+        """Incremental energy from a history (components, ...) on: its derivatives are the stress
+        at the end of a step and the consistent tangent, for F of the history's points."""
+        ...
+
+    def afterwards(self, history: Array, deformation_gradient: Array, /) -> Array:
+        """The history after a step from `history` to F (3, 3, ...), of the same shape."""
         ...

@@ -17,11 +17,14 @@ BLOCK = 1024
 _SIGN = {(0, 1, 2): 1, (1, 2, 0): 1, (2, 0, 1): 1, (2, 1, 0): -1, (1, 0, 2): -1, (0, 2, 1): -1}
 
 
-def in_blocks(f: Array, rank: int, compute: Callable[[Array, Array], None]) -> Array:
+def in_blocks(
+    f: Array, rank: int, compute: Callable[..., None], beside: tuple[Array, ...] = ()
+) -> Array:
     """Result of shape (3,) * rank + the trailing shape of `f`, block by block.
 
-    `compute(f, out)` fills `out` (3, ..., n) from `f` (3, 3, n). What is not defined, where
-    det F <= 0, becomes not a number or infinite, silently: a line search asks there on purpose.
+    `compute(f, out, *beside)` fills `out` (3, ..., n) from `f` (3, 3, n) and from what is known at
+    the same points beside it, (..., points). What is not defined, where det F <= 0, becomes not a
+    number or infinite, silently: a line search asks there on purpose.
     """
     points = f.shape[2:]
     flat = f.reshape(3, 3, -1)
@@ -29,7 +32,7 @@ def in_blocks(f: Array, rank: int, compute: Callable[[Array, Array], None]) -> A
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         for start in range(0, flat.shape[-1], BLOCK):
             block = slice(start, start + BLOCK)
-            compute(flat[..., block], result[..., block])
+            compute(flat[..., block], result[..., block], *(own[..., block] for own in beside))
     reshaped: Array = result.reshape((3,) * rank + points)
     return reshaped
 

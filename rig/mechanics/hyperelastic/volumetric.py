@@ -1,4 +1,4 @@
-"""What a change of volume costs: three functions U(J) in common use, equal for small changes."""
+"""What a change of volume costs: functions U(J) in common use, equal for small changes."""
 
 from __future__ import annotations
 
@@ -50,6 +50,32 @@ class LogarithmicVolume:
     def stiffness(self, volume_ratio: Array, /) -> Array:
         """d2U/dJ2 = K/2 (1 + 1/J^2) in Pa; not a number where J <= 0."""
         return self.bulk_modulus / 2 * (1 + 1 / _positive(volume_ratio) ** 2)
+
+
+@dataclass(frozen=True)
+class HenckyVolume:
+    """U = K/2 (ln J)^2, with the bulk modulus K in Pa: the mean Kirchhoff stress is K ln J.
+
+    Its pressure is largest at J = e, which no solid here comes near.
+    """
+
+    bulk_modulus: float
+
+    def energy(self, volume_ratio: Array, /) -> Array:
+        """U in Pa; infinite where J <= 0."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            value = self.bulk_modulus / 2 * np.log(volume_ratio) ** 2
+        return np.where(np.real(volume_ratio) > 0, value, np.inf)
+
+    def pressure(self, volume_ratio: Array, /) -> Array:
+        """dU/dJ = K ln J / J in Pa; not a number where J <= 0."""
+        j = _positive(volume_ratio)
+        return np.asarray(self.bulk_modulus * np.log(j) / j)
+
+    def stiffness(self, volume_ratio: Array, /) -> Array:
+        """d2U/dJ2 = K (1 - ln J) / J^2 in Pa; not a number where J <= 0."""
+        j = _positive(volume_ratio)
+        return np.asarray(self.bulk_modulus * (1 - np.log(j)) / j**2)
 
 
 def abaqus_volume(d1: float) -> QuadraticVolume:

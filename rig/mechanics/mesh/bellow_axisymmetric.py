@@ -20,7 +20,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.linalg import spsolve
 
 from rig.mechanics.mesh.curved import CurvedQuad
-from rig.mechanics.mesh.lattice import Block, between, join, line, transfinite
+from rig.mechanics.mesh.lattice import Block, join, line, rectangle, transfinite
 from rig.spec.actuator import BellowAxisymmetricGeometry
 
 Array = NDArray[np.float64]
@@ -137,9 +137,9 @@ def mesh_axisymmetric_bellow(
     under = shape.height - shape.wall
     half = _half_layer(shape, n)
     layer = [half, half.mirrored(shape.pitch / 2, axis=1)]
-    collar = _rectangle(inner, outer, 0.0, shape.collar, n.wall, n.collar)
-    rim = _rectangle(inner, outer, under, shape.height, n.wall, n.top)
-    disc = _rectangle(0.0, inner, under, shape.height, n.top_radius, n.top)
+    collar = rectangle((inner, 0.0), (outer, shape.collar), (n.wall, n.collar))
+    rim = rectangle((inner, under), (outer, shape.height), (n.wall, n.top))
+    disc = rectangle((0.0, under), (inner, shape.height), (n.top_radius, n.top))
     blocks = [
         Block(collar, {"i-": "cavity", "i+": "outside", "j-": "clamped"}),
         *(
@@ -158,12 +158,6 @@ def mesh_axisymmetric_bellow(
         shape=shape,
         resolution=n,
     )
-
-
-def _rectangle(r0: float, r1: float, z0: float, z1: float, across: int, up: int) -> Array:
-    low = line(np.array([r0, z0]), np.array([r1, z0]), across)
-    high = line(np.array([r0, z1]), np.array([r1, z1]), across)
-    return between(low, high, up)
 
 
 def _half_layer(shape: AxisymmetricBellow, n: AxisymmetricResolution) -> Block:

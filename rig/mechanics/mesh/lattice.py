@@ -60,6 +60,15 @@ def line(start: Array, end: Array, elements: int) -> Array:
     return between(np.asarray(start, dtype=float), np.asarray(end, dtype=float), elements)
 
 
+def rectangle(
+    low: tuple[float, float], high: tuple[float, float], elements: tuple[int, int]
+) -> Array:
+    """Lattice points of a rectangle between opposite corners, (2a + 1, 2b + 1, 2)."""
+    first = line(np.array(low), np.array([high[0], low[1]]), elements[0])
+    last = line(np.array([low[0], high[1]]), np.array(high), elements[0])
+    return between(first, last, elements[1])
+
+
 def transfinite(low: Array, high: Array, left: Array, right: Array) -> Array:
     """Patch between four curves that meet at their ends (Gordon and Hall), (m, n, d).
 

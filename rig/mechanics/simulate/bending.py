@@ -102,7 +102,9 @@ class BendingModel:
     @cached_property
     def flanks(self) -> Flanks:
         """What watches the folds of outside and cavity."""
-        return Flanks(self.model.discretisation, self.shape)
+        shape = self.shape
+        between = 2 * (shape.trough_arc - shape.wall)
+        return Flanks(self.model.discretisation, between=between, wall=shape.wall)
 
     def measures(self, solution: Solution) -> dict[str, float]:
         """Angle, displacement and volume, as `Response` has them; the gap between flanks in m."""

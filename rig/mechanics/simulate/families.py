@@ -13,6 +13,7 @@ from rig.mechanics.simulate.axisymmetric import axisymmetric_model
 from rig.mechanics.simulate.bending import FREE_OPTIONS, bending_model
 from rig.mechanics.simulate.blocked import BLOCKED_OPTIONS, blocked_bending_model
 from rig.mechanics.simulate.inflation import ActuatorModel
+from rig.mechanics.simulate.joint import joint_model
 from rig.spec.material import MaterialSpec
 
 Build = Callable[[Any, MaterialSpec], ActuatorModel]
@@ -50,6 +51,7 @@ _COARSE_BENDING = BendingResolution(wall=1, crown=4)
 
 FAMILIES: dict[str, Family] = {
     "bellow-axisymmetric": Family(model=Meshing(axisymmetric_model)),
+    "bellow-joint": Family(model=Meshing(joint_model)),
     "bellow-bending": Family(
         model=Meshing(
             partial(bending_model, resolution=_BENDING),

@@ -1,28 +1,27 @@
-"""Whether the flanks of a bending bellow would touch, which the engine does not resist."""
+"""Whether the flanks of a bellow would touch, where nothing resists that."""
 
 from __future__ import annotations
 
-from rig.mechanics.bellow import BellowShape
 from rig.mechanics.fe import Discretisation, State
 from rig.mechanics.fe.selfcontact import FacingSurface
 
 
 class Flanks:
-    """The outside and the cavity of the modelled half, each watched for folds that close.
+    """The outside and the cavity of a modelled bellow, each watched for folds that close.
 
-    What faces its own mirror image across the plane of symmetry is not looked at.
+    What faces its own mirror image across a plane of symmetry is not looked at.
     """
 
-    def __init__(self, discretisation: Discretisation, shape: BellowShape) -> None:
-        """Gaps up to a quarter above that between the flanks at rest are looked for."""
-        between = 2 * (shape.trough_arc - shape.wall)
-        reach = 1.25 * max(between, shape.wall)
+    def __init__(self, discretisation: Discretisation, *, between: float, wall: float) -> None:
+        """Gaps up to a quarter above `between`, that between the flanks at rest, are looked for,
+        at least as far as the `wall` is thick; both in m."""
+        reach = 1.25 * max(between, wall)
         self._surfaces = [
             FacingSurface(
                 discretisation,
                 discretisation.facets_on(side),
                 reach=reach,
-                depth=0.4 * shape.wall,
+                depth=0.4 * wall,
             )
             for side in ("outside", "cavity")
         ]

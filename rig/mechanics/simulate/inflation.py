@@ -24,8 +24,8 @@ Array = NDArray[np.float64]
 RUNGS = 12
 """Rungs up to the actuator's pressure limit."""
 
-_MEASURE, _MODES = "measure ", "modes "
-"""How names of arrays in an entry begin, of what is measured and of each solid's pressures."""
+_MEASURE, _MODES, _HISTORY = "measure ", "modes ", "history "
+"""How names of arrays in an entry begin, of what is measured and of each solid's points."""
 
 
 class ActuatorModel(Protocol):
@@ -157,6 +157,11 @@ def _entry_of(
             f"{_MODES}{i}": np.array([s.points[i].pressure for s in states])
             for i in range(len(actuator.model.solids))
         },
+        **{
+            f"{_HISTORY}{i}": np.array([s.points[i].history for s in states])
+            for i, point in enumerate(actuator.model.start().points)
+            if point.history is not None
+        },
     }
 
 
@@ -180,12 +185,18 @@ def _extremes(entry: Entry) -> tuple[Extremes, ...]:
 
 
 def _solutions(entry: Entry) -> tuple[Solution, ...]:
-    modes = [entry[name] for name in sorted(entry) if name.startswith(_MODES)]
+    solids = [name.removeprefix(_MODES) for name in sorted(entry) if name.startswith(_MODES)]
     return tuple(
         Solution(
             State(
                 x=entry["x"][k],
-                points=tuple(PointState(m[k]) for m in modes),
+                points=tuple(
+                    PointState(
+                        entry[f"{_MODES}{i}"][k],
+                        history=entry[f"{_HISTORY}{i}"][k] if f"{_HISTORY}{i}" in entry else None,
+                    )
+                    for i in solids
+                ),
                 poses=tuple(
                     Pose(shift, rotation)
                     for shift, rotation in zip(entry["shift"][k], entry["rotation"][k], strict=True)
