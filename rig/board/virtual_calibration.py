@@ -13,6 +13,7 @@ import numpy as np
 
 from rig.board.virtual import Seeds, board_on, virtual_part
 from rig.calibrate.air import AIR_KG_M3, BUOYANCY, MASSES_KG_M3
+from rig.calibrate.dead_weight import Piston
 from rig.calibrate.syringe import water_density
 from rig.link.bus import SlcanBus
 from rig.plant.instruments import Instruments
@@ -27,7 +28,7 @@ _CAVITY = 10e-6  # m3 behind the plug, which nobody sees
 
 
 class VirtualReferenceSet:
-    """A gauge, masses and a balance that know the truth within errors drawn once."""
+    """A gauge, masses, a piston and a balance that know the truth within errors drawn once."""
 
     def __init__(
         self,
@@ -39,7 +40,7 @@ class VirtualReferenceSet:
         self._plant = plant
         self._spec = references
         self._density = water_density(temperature_c) * 1e3
-        gauge, mass, balance = rng.normal(size=3)
+        gauge, mass, balance, self._area = rng.normal(size=4)
         self._gauge = 1 + references.gauge_u * gauge
         self._mass = 1 + references.mass_u * mass
         self._balance = 1 + references.balance_u * balance
@@ -50,6 +51,15 @@ class VirtualReferenceSet:
         del about_kpa, idle
         shown = self._plant.truth().gauge_pressure * self._gauge
         return _displayed(shown, self._spec.gauge_resolution) / 1e3
+
+    def floating_g(self, piston: Piston, about_kpa: float, idle: Idle) -> float:
+        """Masses are chosen to the last digit of the balance; the true area is not as certified."""
+        del about_kpa, idle
+        area = piston.area_mm2 / 1e6 * (1 + piston.area_u * self._area)
+        borne = self._plant.truth().gauge_pressure * area / STANDARD_GRAVITY
+        conventional = borne * MASSES_KG_M3 / (MASSES_KG_M3 - AIR_KG_M3)
+        masses = (conventional - piston.mass_g / 1e3) / self._mass
+        return _displayed(masses, self._spec.balance_resolution) * 1e3
 
     def place(self, mass_g: float, idle: Idle) -> None:
         """Masses press by their weight less the air's buoyancy."""

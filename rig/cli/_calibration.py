@@ -17,6 +17,7 @@ from rich.markup import escape
 
 from rig.board.real import INSTRUCTIONS
 from rig.board.virtual_calibration import VirtualCalibrationBench
+from rig.calibrate.dead_weight import Piston
 from rig.calibrate.errors import CalibrateError
 from rig.calibrate.points import Row, read_points
 from rig.cli._calibration_file import finish, folder, provenance
@@ -43,6 +44,8 @@ from rig.spec.quantity import CELSIUS
 from rig.spec.workspace import BenchCalibrations, Workspace
 
 T = TypeVar("T")
+FAR_KPA, FAR_SHARE = 1.0, 0.1
+"""What a transducer that is not calibrated yet may differ from a reference by, at most."""
 Procedure = Callable[[CalibrationBench, RigLink, Taken, Stage], None]
 
 
@@ -226,10 +229,25 @@ class TerminalReferences:
         """Ask for the gauge's reading; asked again until it is a number near what it must be."""
         while True:
             shown = self._number(f"The gauge shows, in kPa (about {about_kpa:g}, as 9.998): ", idle)
-            if abs(shown - about_kpa) <= 1 + 0.1 * about_kpa:
+            if abs(shown - about_kpa) <= FAR_KPA + FAR_SHARE * about_kpa:
                 return shown
             self._console.print(
                 f"{shown:g} kPa is far from {about_kpa:g} kPa. Is the gauge in kPa, and zeroed?"
+            )
+
+    def floating_g(self, piston: Piston, about_kpa: float, idle: Idle) -> float:
+        """Ask for masses; asked again until they are near what must be."""
+        about_g = piston.masses_g(about_kpa)
+        question = (
+            f"Add masses (about {about_g:.1f} g) until the turning piston neither rises nor sinks. "
+            "Their sum without the piston, in g: "
+        )
+        while True:
+            masses_g = self._number(question, idle)
+            if abs(piston.pressure_kpa(masses_g) - about_kpa) <= FAR_KPA + FAR_SHARE * about_kpa:
+                return masses_g
+            self._console.print(
+                f"{masses_g:g} g are far from {about_g:.1f} g. In grams, without the piston?"
             )
 
     def place(self, mass_g: float, idle: Idle) -> None:

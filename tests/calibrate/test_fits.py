@@ -11,6 +11,7 @@ import pytest
 
 from rig.calibrate.air import BUOYANCY
 from rig.calibrate.curve import fit_curve
+from rig.calibrate.dead_weight import Piston
 from rig.calibrate.errors import CalibrateError
 from rig.calibrate.least_squares import least_squares, widening
 from rig.calibrate.load_cell import fit_creep, fit_load_cell, grams_force
@@ -132,6 +133,14 @@ def test_masses_press_less_in_air_and_more_where_gravity_is_stronger() -> None:
     assert grams_force(np.array([100.0]), 9.832)[0] / grams_force(np.array([100.0]))[
         0
     ] == pytest.approx(9.832 / 9.80665)
+
+
+def test_a_piston_floats_where_its_weight_in_air_is_the_pressure_on_its_area() -> None:
+    piston = Piston(area_mm2=80.65, area_u=5e-5, mass_g=7.3, gravity=9.8118)
+    # 0.1073 kg less 0.0161 g of air, times 9.8118 m/s2: 1.052648 N on 80.65 mm2
+    assert piston.pressure_kpa(100.0) == pytest.approx(13.05205, abs=2e-5)
+    assert piston.masses_g(piston.pressure_kpa(42.0)) == pytest.approx(42.0)
+    assert piston.masses_g(0.5 * piston.pressure_kpa(0.0)) < 0
 
 
 def test_a_load_cell_is_found_with_its_creep() -> None:

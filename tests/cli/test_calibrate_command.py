@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from rig.calibrate.dead_weight import Piston
 from rig.cli._calibration import RealCalibrationBench, TerminalReferences
 from rig.experiment.errors import AbortedError
 from rig.link.bus import SlcanBus
@@ -177,6 +178,41 @@ def test_a_person_is_asked_until_the_answer_makes_sense_and_the_board_is_kept_al
     assert references.gauge_kpa(10.0, typist.woken.set) == 9.98
     assert any("no number" in text for text in typist.said)
     assert any("far from 10" in text for text in typist.said)
+
+
+def test_a_person_is_asked_for_the_masses_on_a_piston() -> None:
+    piston = Piston(area_mm2=80.65, area_u=0.0, mass_g=7.3, gravity=9.80665)
+    typist = Typist("0,075", "74,95")
+    references = TerminalReferences(typist)  # type: ignore[arg-type]
+    assert references.floating_g(piston, 10.0, typist.woken.set) == 74.95
+    assert "about 75.0 g" in typist.said[0]
+    assert any("far from 75.0 g" in text for text in typist.said)
+
+
+TESTER = ("calibrate", "pressure", "--piston-area-mm2", "80.65", "--piston-g", "7.3")
+
+
+def test_a_dead_weight_tester_is_told_in_the_calibration(
+    rig: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    out = tmp_path / "made.yaml"
+    few = ("--bench", "virtual-beam", "--steps", "5", "--cycles", "1", "--out", out)
+    outcome = rig(*TESTER, "--piston-area-u", "0.3", *few)
+    assert outcome.code == 0, outcome.err
+    made = load_calibration(out)
+    assert isinstance(made, TransducerCalibration)
+    assert "80.65 mm2 (u = 0.3 %), piston 7.3 g" in made.provenance.method
+    assert "simulated masses" in made.provenance.reference
+    assert made.gain_u == pytest.approx(3e-3, rel=0.1)
+
+
+def test_a_real_tester_needs_the_gravity_of_the_lab_and_a_light_piston(rig: Command) -> None:
+    mega = ("--bench", "mega", "--reference", "M1 set", "--reference-u", "0.003")
+    assert "--gravity" in rig(*TESTER, *mega).err
+    heavy = rig("calibrate", "pressure", "--piston-area-mm2", "80.65", "--piston-g", "200")
+    assert heavy.code == 2
+    assert "the piston alone makes 24.3 kPa" in heavy.err
 
 
 def test_input_that_ends_stops_the_calibration() -> None:

@@ -14,6 +14,7 @@ import pytest
 from rig.board.virtual import VirtualBench
 from rig.board.virtual_calibration import VirtualCalibrationBench, VirtualReferenceSet
 from rig.board.virtual_target import hidden_lean
+from rig.calibrate.dead_weight import Piston
 from rig.calibrate.load_cell import fit_load_cell
 from rig.calibrate.points import Row
 from rig.calibrate.syringe import Surroundings, fit_syringe
@@ -39,7 +40,7 @@ from rig.spec.calibration import (
     SyringeCalibration,
     TransducerCalibration,
 )
-from rig.spec.quantity import CELSIUS
+from rig.spec.quantity import CELSIUS, STANDARD_GRAVITY
 from rig.spec.workspace import Workspace
 
 from .conftest import ROOT, make_request
@@ -58,16 +59,19 @@ def silent(_: str) -> None:
     return
 
 
-def calibrated_transducer(seed: int, steps: int = 10) -> tuple[Instruments, TransducerCalibration]:
+def calibrated_transducer(
+    seed: int, steps: int = 10, piston: Piston | None = None
+) -> tuple[Instruments, TransducerCalibration]:
     bench, rows = VirtualCalibrationBench(BENCH, seed), list[Row]()
     plan = PressurePlan(tuple(np.linspace(14 / steps, 14, steps).tolist()))
     calibrate_on(
         bench,
         PARAMETERS,
-        lambda link: pressure_points(bench, link, plan, rows.append, silent),
+        lambda link: pressure_points(bench, link, plan, rows.append, silent, piston),
         silent,
     )
-    made = fit_transducer(rows).calibration(rows, REFERENCES.gauge_u, PROVENANCE)
+    scale_u = REFERENCES.gauge_u if piston is None else np.hypot(REFERENCES.mass_u, piston.area_u)
+    made = fit_transducer(rows).calibration(rows, float(scale_u), PROVENANCE)
     return bench.instruments, made
 
 
@@ -211,6 +215,17 @@ def test_the_reference_gauge_has_an_error_of_its_own() -> None:
         truth = bench.plant.truth().gauge_pressure / 1e3
         readings.append(bench.references.gauge_kpa(0.0, lambda: None) / truth - 1)
     assert np.std(readings) == pytest.approx(REFERENCES.gauge_u, rel=0.6)
+
+
+def test_a_dead_weight_tester_calibrates_as_a_gauge_does_within_its_own_uncertainty() -> None:
+    piston = Piston(area_mm2=80.65, area_u=5e-4, mass_g=7.3, gravity=STANDARD_GRAVITY)
+    found = []
+    for seed in range(4):
+        true, made = calibrated_transducer(seed, 7, piston)
+        assert made.gain_u >= 5e-4
+        found += transducer_en(true, made)
+    assert max(map(abs, found)) < 1.5
+    assert np.sqrt(np.mean(np.square(found))) > 0.15  # the area's error is there, and counted
 
 
 def test_the_balance_weighs_water_in_air(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rig.calibrate.dead_weight import Piston
 from rig.calibrate.points import Row
-from rig.experiment.calibration.references import CalibrationBench, Stage, Taken
+from rig.experiment.calibration.references import CalibrationBench, References, Stage, Taken
 from rig.experiment.errors import ExperimentError
 from rig.experiment.prepare import leave_home, make_ready, tare, vent
 from rig.experiment.sweep import cell_readings, go_to, settle
@@ -64,9 +65,17 @@ class SyringePlan:
 
 
 def pressure_points(
-    bench: CalibrationBench, link: RigLink, plan: PressurePlan, taken: Taken, stage: Stage
+    bench: CalibrationBench,
+    link: RigLink,
+    plan: PressurePlan,
+    taken: Taken,
+    stage: Stage,
+    piston: Piston | None = None,
 ) -> None:
-    """Transducer beside a gauge on the plugged tube; the plunger makes the pressure."""
+    """Transducer beside a gauge, or the `piston` of a dead-weight tester, on the plugged tube.
+
+    The plunger makes the pressure.
+    """
     bench.mount("plugged", link.receive)
     stage("homing the plunger and zeroing the transducer")
     make_ready(link)
@@ -79,7 +88,7 @@ def pressure_points(
             settle(link, target_kpa, SETTLING)
             link.wait(REST_S)
             before = _mean(link, "CONTROLLER", "transducer_v", READING_S)
-            shown_kpa = bench.references.gauge_kpa(target_kpa, link.receive)
+            shown_kpa = _reference_kpa(bench.references, piston, target_kpa, link)
             after = _mean(link, "CONTROLLER", "transducer_v", READING_S)
             taken(
                 {
@@ -180,6 +189,14 @@ def there_and_back(values: Sequence[float]) -> list[tuple[str, float]]:
     """Each value on the way up, the highest twice, and each on the way down."""
     up = sorted(values)
     return [("up", value) for value in up] + [("down", value) for value in reversed(up)]
+
+
+def _reference_kpa(
+    references: References, piston: Piston | None, about_kpa: float, link: RigLink
+) -> float:
+    if piston is None:
+        return references.gauge_kpa(about_kpa, link.receive)
+    return piston.pressure_kpa(references.floating_g(piston, about_kpa, link.receive))
 
 
 def _vented(link: RigLink, taken: Taken) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
+from rig.calibrate.dead_weight import Piston
 from rig.calibrate.points import Row
 from rig.experiment.bench import Fixture
 from rig.link.bus import FrameBus
@@ -35,6 +36,14 @@ class References(Protocol):
 
     def gauge_kpa(self, about_kpa: float, idle: Idle) -> float:
         """What the reference gauge shows now, in kPa; about `about_kpa`."""
+        ...
+
+    def floating_g(self, piston: Piston, about_kpa: float, idle: Idle) -> float:
+        """Masses in grams with which the piston of a dead-weight tester floats now.
+
+        The bench holds about `about_kpa` meanwhile; masses are added until the piston neither rises
+        nor sinks.
+        """
         ...
 
     def place(self, mass_g: float, idle: Idle) -> None:
