@@ -11,7 +11,10 @@ import typer
 from rig.cli.app import app
 
 if TYPE_CHECKING:
-    from rig.study.updating import Measured, Prediction, Update
+    from rig.spec.workspace import Setup
+    from rig.study.forward import Forward, Priors
+    from rig.study.measured import Measured
+    from rig.study.updating import Prediction, Update
 
 _DEGREES = degrees(1)
 """Degrees a radian."""
@@ -43,6 +46,15 @@ def update(
     predict: Annotated[
         Path | None, typer.Option(help="Another run of the same actuator, to be foretold.")
     ] = None,
+    study: Annotated[
+        Path | None,
+        typer.Option(
+            help="Study of modulus and wall whose surfaces answer instead of beam theory."
+        ),
+    ] = None,
+    results: Annotated[
+        Path | None, typer.Option(help="Folder of its results. Default: studies/NAME.")
+    ] = None,
     mcmc: Annotated[
         int, typer.Option(min=0, help="Steps of a Markov chain (emcee) instead of a normal law.")
     ] = 0,
@@ -52,22 +64,21 @@ def update(
     """Estimate modulus, wall thickness and b of the actuator that a run measured.
 
     The beam model with an offset and softening is fitted to angles and forces of the run, with what
-    material and printer promise as priors; what was held out, or another run, is foretold.
+    material and printer promise as priors; what was held out, or another run, is foretold. With
+    --study the response surfaces of a finished study, as of finite elements, take the place of beam
+    theory; their error at the study's check points counts as uncertainty.
 
-    Example: `rig update logs/first --hold-out 3,7`
+    Examples: `rig update logs/first --hold-out 3,7`;
+    `rig update logs/first --study bellow-bending-fe`
     """
     import json
 
     import numpy as np
 
     from rig.record.reader import RunReader
-    from rig.study.updating import (
-        Priors,
-        read_measured,
-        require_same_actuator,
-        update_model,
-        without_pressures,
-    )
+    from rig.study.forward import BeamForward, Priors
+    from rig.study.measured import read_measured, require_same_actuator, without_pressures
+    from rig.study.updating import update_model
 
     setup = RunReader(run).setup()
     measured = read_measured(run)
@@ -78,12 +89,30 @@ def update(
         require_same_actuator(setup, RunReader(predict).setup())
         unseen[str(predict)] = read_measured(predict)
     priors = Priors(modulus / 100, wall / 100, free_parameter / 100)
-    found = update_model(setup.actuator, setup.material, measured, priors, mcmc=mcmc, seed=seed)
+    forward: Forward = (
+        BeamForward.of(setup.actuator, setup.material, priors)
+        if study is None
+        else _surfaces(study, results, setup, priors)
+    )
+    found = update_model(forward, measured, mcmc=mcmc, seed=seed)
     foretold = {name: found.predict(levels) for name, levels in unseen.items()}
     if as_json:
         typer.echo(json.dumps(_plain(found, foretold), indent=2))
     else:
         _show(found, foretold)
+
+
+def _surfaces(file: Path, results: Path | None, setup: Setup, priors: Priors) -> Forward:
+    from rig.spec.workspace import Workspace
+    from rig.study.plan import make_plan
+    from rig.study.results import Folder
+    from rig.study.run import known_study
+    from rig.study.surrogate import SurfaceForward
+
+    workspace = Workspace.find()
+    plan = make_plan(workspace.path("study", file), workspace)
+    folder = Folder(results or Path("studies") / plan.spec.name)
+    return SurfaceForward.of(known_study(plan, folder), setup.actuator, setup.material, priors)
 
 
 def _pressures(text: str) -> list[float]:
@@ -109,6 +138,7 @@ def _plain(found: Update, foretold: dict[str, tuple[Prediction, Prediction]]) ->
         },
         "correlation": found.correlation.tolist(),
         "chi2_reduced": found.chi2_reduced,
+        "at_bounds": found.at_bounds,
         "foretold": {
             name: {
                 kind: {"levels": p.mean.size, "rmse": p.rmse, "beyond": p.beyond}
@@ -142,6 +172,12 @@ def _show(found: Update, foretold: dict[str, tuple[Prediction, Prediction]]) -> 
     console.print(
         f"residuals over their uncertainties: {found.chi2_reduced**0.5:.2g} RMS", soft_wrap=True
     )
+    for name in found.at_bounds:
+        console.print(
+            f"{name.replace('_', ' ')} is at the edge of what the model is good for: its interval "
+            f"means nothing; widen the study's levels, or look for what else the run has",
+            soft_wrap=True,
+        )
     for name, (angles, forces) in foretold.items():
         for kind, p, factor, unit in (
             ("angle", angles, _DEGREES, "deg"),

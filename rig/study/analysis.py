@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.spec.study import FractionalFactorialDesign, FullFactorialDesign, StudySpec
+from rig.spec.study import FractionalFactorialDesign, FullFactorialDesign
 from rig.study.design import power_of_two
 from rig.study.errors import StudyError
 from rig.study.factors import (
@@ -101,7 +101,7 @@ def surface_of(study: Study, response: str) -> Surface:
     factors = lab_factors(study.plan)
     values = np.array([values[response] for _, values in study.fitted])
     points = points_of(study.plan, [point for point, _ in study.fitted])
-    return fit_surface(response, factors, points, values, _terms(study.plan.spec, factors))
+    return fit_surface(response, factors, points, values, model_terms(study.plan))
 
 
 @dataclass(frozen=True)
@@ -151,10 +151,10 @@ def points_of(plan: Plan, points: Sequence[Point]) -> Array:
     return np.array(rows).reshape(len(points), len(plan.factors))
 
 
-def _terms(spec: StudySpec, factors: tuple[Factor, ...]) -> tuple[Term, ...]:
+def model_terms(plan: Plan) -> tuple[Term, ...]:
     """The model that the design is made for."""
-    count = len(factors)
-    match spec.design:
+    count = len(plan.factors)
+    match plan.spec.design:
         case FractionalFactorialDesign():
             return linear_terms(count)
         case FullFactorialDesign(levels=2):

@@ -13,17 +13,17 @@ from test_run import LIBRARY
 from rig.mechanics.beam import published_free_parameter
 from rig.plant.specimen import Specimen, draw_specimen
 from rig.study.errors import StudyError
-from rig.study.updating import (
+from rig.study.forward import BeamForward, Priors
+from rig.study.measured import (
     Measured,
-    Priors,
-    Update,
     read_measured,
     require_same_actuator,
-    update_model,
     without_pressures,
 )
+from rig.study.updating import Update, update_model
 
 ACTUATOR, MATERIAL = LIBRARY.actuator("bellow-bending"), LIBRARY.material("agilus30")
+BEAM = BeamForward.of(ACTUATOR, MATERIAL)
 BENCH = LIBRARY.bench("virtual-beam")
 U_ANGLE, U_FORCE = np.radians(0.1), 0.1e-3 * 9.80665
 LEVELS = np.arange(0.0, 10.5e3, 1e3)
@@ -62,7 +62,7 @@ def truth(one: Specimen) -> dict[str, float]:
 
 @pytest.fixture(scope="module")
 def updates() -> list[tuple[Specimen, Update]]:
-    return [(s, update_model(ACTUATOR, MATERIAL, measured(s, i))) for i, s in drawn()]
+    return [(s, update_model(BEAM, measured(s, i))) for i, s in drawn()]
 
 
 def drawn() -> list[tuple[int, Specimen]]:
@@ -116,8 +116,8 @@ def test_a_held_out_protocol_is_foretold(updates: list[tuple[Specimen, Update]])
 def test_the_chain_agrees_with_the_normal_approximation() -> None:
     one = specimen(1)
     run = measured(one, 1)
-    normal = update_model(ACTUATOR, MATERIAL, run)
-    chain = update_model(ACTUATOR, MATERIAL, run, mcmc=400)
+    normal = update_model(BEAM, run)
+    chain = update_model(BEAM, run, mcmc=400)
     for name in ("effective_modulus", "wall", "offset"):
         assert abs(chain[name].value - normal[name].value) < 0.5 * normal[name].deviation
         assert chain[name].deviation == pytest.approx(normal[name].deviation, rel=0.4)
@@ -141,7 +141,7 @@ def test_a_run_is_read_from_its_summary_and_levels_can_be_held_out(tmp_path: Pat
     with pytest.raises(StudyError, match="at 70 kPa, which you want to hold out"):
         without_pressures(run, np.array([4e3, 70e3]))
     with pytest.raises(StudyError, match="4 levels"):
-        update_model(ACTUATOR, MATERIAL, run)
+        update_model(BEAM, run)
     with pytest.raises(StudyError, match="recorded run"):
         read_measured(tmp_path / "nothing")
 
