@@ -53,6 +53,10 @@ class ProgressObserver:
         """Name a step outside the points."""
         self._bar.update(self._task, description=text)
 
+    def warned(self, text: str) -> None:
+        """Say so at once."""
+        self._console.print(f"Warning: {text}", style="bold yellow", markup=False, soft_wrap=True)
+
     def point_began(self, key: PointKey) -> None:
         """Name the point."""
         self._bar.update(

@@ -53,6 +53,10 @@ class Observer(Protocol):
         """A step outside the points, as homing."""
         ...
 
+    def warned(self, text: str) -> None:
+        """Something is wrong, but the run goes on."""
+        ...
+
     def point_began(self, key: PointKey) -> None:
         """A set-point was sent."""
         ...
@@ -69,6 +73,9 @@ class Nobody:
         """Ignore."""
 
     def stage(self, text: str) -> None:
+        """Ignore."""
+
+    def warned(self, text: str) -> None:
         """Ignore."""
 
     def point_began(self, key: PointKey) -> None:

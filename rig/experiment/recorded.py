@@ -17,7 +17,8 @@ from rig.errors import RigError
 from rig.experiment.errors import AbortedError
 from rig.experiment.prepare import make_safe
 from rig.experiment.recorder import LinkRecorder
-from rig.link.client import Identity, RigLink
+from rig.link.client import Identity, Message, RigLink, Tap
+from rig.link.slcan import RawFrame
 from rig.record.documents import StopDocument
 from rig.record.errors import RecordError
 from rig.record.writer import RunWriter
@@ -64,14 +65,21 @@ def carry_out(
     success: str,
     cautions: Sequence[str] = (),
     stage: Callable[[str], None],
+    watch: Tap | None = None,
 ) -> RunOutcome:
-    """Do `work` with everything that comes over the link on record.
+    """Do `work` with everything that comes over the link on record, and shown to `watch`.
 
     However it ends, the bench is vented and the log gets its stop document; `success` is what that
     says if nothing went wrong.
     """
     recorder = LinkRecorder(record)
-    link.set_tap(recorder)
+
+    def tap(frames: Sequence[RawFrame], messages: Sequence[Message]) -> None:
+        recorder(frames, messages)
+        if watch is not None:
+            watch(frames, messages)
+
+    link.set_tap(tap)
     for caution in cautions:
         record.event(link.now_s, "caution", {"what": caution}, "warning")
     error: RigError | None = None
@@ -90,6 +98,7 @@ def carry_out(
         stop = StopDocument(exit_status="failed", reason=f"{type(crash).__name__}: {crash}")
         # the log may be what broke (a full disk): venting must not depend on it
         recorder.drop_what_cannot_be_written()
+        link.set_tap(recorder)
     try:
         stage("making the bench safe")
         ending = make_safe(link)

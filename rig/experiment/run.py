@@ -6,7 +6,9 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from rig.control.gas_monitor import GasAlarm
 from rig.experiment.bench import Bench, Fixture, Observer
+from rig.experiment.gas_watch import GasWatch, describe_alarm, gas_monitor
 from rig.experiment.measure import AngleMeasurement, ForceMeasurement, Measurement
 from rig.experiment.plan import Sweep
 from rig.experiment.plausible import ResponseCheck, require_zero
@@ -122,18 +124,39 @@ def _configure(link: RigLink, request: RunRequest) -> dict[str, float]:
 
 def _recorded(context: RunContext, record: RunWriter, done: Collection[PointKey]) -> RunOutcome:
     request = context.request
+    watch = _gas_watch(context, record)
     return carry_out(
         context.link,
         record,
-        lambda recorder: _experiments(context, record, recorder, frozenset(done)),
+        lambda recorder: _experiments(context, record, recorder, watch, frozenset(done)),
         success="all points were measured",
         cautions=request.cautions,
         stage=context.observer.stage,
+        watch=watch,
+    )
+
+
+def _gas_watch(context: RunContext, record: RunWriter) -> GasWatch:
+    """Warns of leaks, in the log and to whoever watches."""
+
+    def warn(time_s: float, alarm: GasAlarm) -> None:
+        text = describe_alarm(time_s, alarm)
+        record.event(time_s, alarm.kind, {"what": text}, "warning")
+        context.observer.warned(text)
+
+    return GasWatch(
+        make_monitor=lambda: gas_monitor(context.request),
+        warn=warn,
+        note=lambda document: record.gas(document, document.to_s),
     )
 
 
 def _experiments(
-    context: RunContext, record: RunWriter, recorder: LinkRecorder, done: frozenset[PointKey]
+    context: RunContext,
+    record: RunWriter,
+    recorder: LinkRecorder,
+    watch: GasWatch,
+    done: frozenset[PointKey],
 ) -> None:
     """Every sweep that still has points to take."""
     link, observer = context.link, context.observer
@@ -153,6 +176,7 @@ def _experiments(
         if sweep.experiment != mounted:
             mounted = sweep.experiment
             _mount(context, mounted)
+            watch.renew()
             observer.stage("conditioning the actuator")
             condition(link, context.request.plan.settings(mounted))
         _sweep(context, record, recorder, sweep, left)

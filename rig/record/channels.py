@@ -36,6 +36,7 @@ CAMERA_TOPIC = "/camera"
 CAMERA_KEY_TOPIC = "/camera/key"
 ANGLE_TOPIC = "/vision/angle"
 POINTS_TOPIC = "/points"
+GAS_TOPIC = "/gas"
 LOG_TOPIC = "/log"
 TELEMETRY_PREFIX = "/rig/"
 

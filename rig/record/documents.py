@@ -106,6 +106,25 @@ class AngleReading(Document):
     reason: str
 
 
+class GasDocument(Document):
+    """What a Kalman filter made of plunger and pressure between a closing of the valve and the next
+    opening; uncertainties are standard. `rig.control.gas` has the model."""
+
+    from_s: float
+    to_s: float
+    gas_ml: float
+    """Gas in the line at the end, as its volume at ambient pressure and temperature."""
+    gas_u_ml: float
+    actuator_ml: float
+    """Volume of the actuator at the end, with whatever the line's own volume is off by."""
+    actuator_u_ml: float
+    leak_ml_s: float
+    """At 10 kPa gauge; since the leak began, if one was found."""
+    leak_u_ml_s: float
+    nis: float
+    """Mean normalised innovation squared; far above 1 the uncertainties are not to be trusted."""
+
+
 class ResumeDocument(Document):
     """A killed or aborted run was taken up again."""
 

@@ -20,6 +20,7 @@ from rig.record.channels import (
     CAMERA_KEY_TOPIC,
     CAMERA_TOPIC,
     CAN_TOPIC,
+    GAS_TOPIC,
     LEVELS,
     LOG_FILE,
     LOG_TOPIC,
@@ -34,6 +35,7 @@ from rig.record.channels import (
 from rig.record.documents import (
     AngleReading,
     Document,
+    GasDocument,
     PointDocument,
     PointKey,
     ResumeDocument,
@@ -156,6 +158,10 @@ class RunReader:
     def angle_readings(self) -> tuple[AngleReading, ...]:
         """Every vision result in the order of measurement."""
         return self._documents(ANGLE_TOPIC, AngleReading)
+
+    def gas(self) -> tuple[GasDocument, ...]:
+        """What the gas did each time the valve was closed."""
+        return self._documents(GAS_TOPIC, GasDocument)
 
     def images(self) -> Iterator[CameraImage]:
         """Every recorded image, one at a time."""

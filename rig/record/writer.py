@@ -26,6 +26,7 @@ from rig.record.channels import (
     CAMERA_KEY_TOPIC,
     CAMERA_TOPIC,
     CAN_TOPIC,
+    GAS_TOPIC,
     LEVELS,
     LOG_FILE,
     LOG_TOPIC,
@@ -43,6 +44,8 @@ from rig.record.channels import (
 )
 from rig.record.documents import (
     AngleReading,
+    Document,
+    GasDocument,
     PointDocument,
     PointKey,
     ResumeDocument,
@@ -278,6 +281,10 @@ class RunWriter:
         self._document(POINTS_TOPIC, document, time_s)
         self._log.sync()
 
+    def gas(self, document: GasDocument, time_s: float) -> None:
+        """What the gas did while the valve was closed."""
+        self._document(GAS_TOPIC, document, time_s)
+
     def resume_note(self, document: ResumeDocument, time_s: float) -> None:
         """The run was taken up again."""
         self.event(time_s, "resume", document.model_dump(), "warning")
@@ -305,7 +312,7 @@ class RunWriter:
             self._stream.close()
             self._lock.release()
 
-    def _document(self, topic: str, document: AngleReading | PointDocument, time_s: float) -> None:
+    def _document(self, topic: str, document: Document, time_s: float) -> None:
         channel_id = self._log.register(topic, "json", document_schema(type(document)))
         data = document.model_dump_json(exclude_none=True).encode()
         self._log.add(topic, channel_id, times_to_ns((time_s,)), [data])

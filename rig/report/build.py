@@ -28,6 +28,8 @@ SUMMARY_FILE = "summary.json"
 REPORT_FILE = "report.html"
 CURVE_POINTS = 101
 FINITE_ELEMENTS = "fe"
+GAS_ALARMS = ("leak", "burst")
+"""Events of the log that are told on top of the report."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,7 @@ def analyse(reader: RunReader, job: Job | None = None) -> Analysis:
     """
     data = load_run(reader)
     predictions, notes = _predictions(data, job or Job())
+    notes += [str(e.data["what"]) for e in reader.events() if e.name in GAS_ALARMS]
     return Analysis(data, predictions, summarise(data, predictions, _published(), notes))
 
 
