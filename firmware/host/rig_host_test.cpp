@@ -200,8 +200,13 @@ void rig_test_loop_target(rig_test_loop *loop, float start_kpa, float target_kpa
   loop->setpoint.set_target(rig::kpa(target_kpa));
 }
 
+void rig_test_loop_retarget(rig_test_loop *loop, float target_kpa) {
+  loop->setpoint.set_target(rig::kpa(target_kpa));
+}
+
 float rig_test_loop_tick(rig_test_loop *loop, float measured_kpa, float plunger_ml, int blocked) {
-  loop->setpoint.tick(loop->parameters.setpoint_rate());
+  loop->setpoint.tick(rig::ramp_limits(loop->parameters, loop->setpoint.value(),
+                                       rig::ml(plunger_ml)));
   return rig::to_ml_s(loop->loop.tick(loop->parameters, loop->setpoint, rig::kpa(measured_kpa),
                                       rig::ml(plunger_ml), static_cast<int8_t>(blocked)));
 }

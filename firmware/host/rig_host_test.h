@@ -70,6 +70,7 @@ rig_test_loop *rig_test_loop_new(float proportional, float integral, float feed_
                                  float deadband_kpa, float max_flow_ml_s);
 void rig_test_loop_free(rig_test_loop *loop);
 void rig_test_loop_target(rig_test_loop *loop, float start_kpa, float target_kpa);
+void rig_test_loop_retarget(rig_test_loop *loop, float target_kpa);
 float rig_test_loop_tick(rig_test_loop *loop, float measured_kpa, float plunger_ml, int blocked);
 float rig_test_loop_setpoint_kpa(const rig_test_loop *loop);
 float rig_test_loop_integral_ml_s(const rig_test_loop *loop);

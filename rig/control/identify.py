@@ -162,12 +162,14 @@ def play(position: Array, width: float) -> Array:
     return np.array(follower)
 
 
-def identify_level(recording: Recording, most_terms: int = MOST_TERMS) -> Fit:
+def identify_level(
+    recording: Recording, least_delay_s: float = 0.0, most_terms: int = MOST_TERMS
+) -> Fit:
     """The model with as many terms as the recording supports.
 
-    Raises ControlError if no model can be fitted.
+    `least_delay_s` is what is known of the delay without any experiment. Raises ControlError if no model can be fitted.
     """
-    fits = {terms: _fit(recording, terms) for terms in range(most_terms + 1)}
+    fits = {terms: _fit(recording, terms, least_delay_s) for terms in range(most_terms + 1)}
     alternatives = {terms: fit.criterion for terms, fit in fits.items() if fit is not None}
     found = [fit for fit in fits.values() if fit is not None]
     if not found:
@@ -220,15 +222,15 @@ class _Problem:
         return linear, self.recording.pressure_kpa - regressors @ linear
 
 
-def _fit(recording: Recording, terms: int) -> Fit | None:
+def _fit(recording: Recording, terms: int, least_delay_s: float) -> Fit | None:
     """The best model with `terms` lags; None if its time constants run into each other."""
     from scipy.optimize import least_squares
 
     problem = _Problem.of(recording)
     travel = float(np.ptp(recording.plunger_ml))
-    low = [*[math.log(SHORTEST_S)] * terms, 0.0, 0.0]
+    low = [*[math.log(SHORTEST_S)] * terms, least_delay_s, 0.0]
     high = [*[math.log(LONGEST_S)] * terms, LONGEST_DELAY_S, 0.5 * travel]
-    start = [*(math.log(t) for t in STARTS_S[:terms]), 0.01, 0.02 * travel]
+    start = [*(math.log(t) for t in STARTS_S[:terms]), least_delay_s + 0.004, 0.02 * travel]
     scale = [*[1.0] * terms, 0.01, 0.02 * travel]
 
     def residual(nonlinear: Array) -> Array:

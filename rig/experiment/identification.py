@@ -353,7 +353,8 @@ def analyse_identification(reader: RunReader) -> Analysis:
     compliance = predicted_compliance(setup, tuple(by_level))
     fits, relays, levels = [], [], []
     for setpoint_kpa, excited in sorted(by_level.items()):
-        fit = identify_level(joined([one for one in excited if one.kind in FIT_KINDS]))
+        shaken = joined([one for one in excited if one.kind in FIT_KINDS])
+        fit = identify_level(shaken, KNOWN_DELAY_S)
         relay = joined([one for one in excited if one.kind == "relay"])
         point = relay_point(relay, fit.model.backlash_ml)
         column = GasColumn(

@@ -13,6 +13,9 @@ DEADBAND_KPA = 0.01
 MAX_FLOW = 5.0
 # defaults of the firmware
 SYSTEM_ML, AMBIENT_KPA, SETPOINT_RATE = 70.0, 101.325, 2.0
+MAX_ACCELERATION = 40.0
+RAMP_SHARE = 0.8
+"""Of the drive's flow and acceleration, which the set-point may ask for."""
 
 
 class Loop:
@@ -27,6 +30,9 @@ class Loop:
     def target(self, start: float, target: float) -> Loop:
         lib.rig_test_loop_target(self._loop, start, target)
         return self
+
+    def retarget(self, target: float) -> None:
+        lib.rig_test_loop_retarget(self._loop, target)
 
     def tick(self, measured: float, plunger: float = 0.0, blocked: int = 0) -> float:
         return float(lib.rig_test_loop_tick(self._loop, measured, plunger, blocked))
@@ -64,22 +70,86 @@ def test_a_lasting_error_is_integrated() -> None:
     assert loop.integral == pytest.approx(KI * (0.1 - DEADBAND_KPA) * 100 * TICK_S, rel=1e-3)
 
 
+def kpa_per_ml(setpoint: float, plunger: float = 0.0) -> float:
+    """Boyle's stiffness of the gas in front of the plunger."""
+    return (AMBIENT_KPA + setpoint) / (SYSTEM_ML - plunger)
+
+
+def ramp(loop: Loop, target: float, plunger: float = 0.0) -> np.ndarray:
+    """Set-points of every tick until the target is reached, in the firmware's single precision."""
+    values = [loop.setpoint]
+    while loop.setpoint != np.float32(target):
+        loop.tick(target, plunger)
+        values.append(loop.setpoint)
+        assert len(values) < 10_000
+    return np.array(values)
+
+
 def test_the_setpoint_moves_at_its_rate_and_stops_at_the_target() -> None:
-    loop = Loop().target(1.0, 2.0)
-    ticks = round(1.0 / SETPOINT_RATE / TICK_S)
-    for _ in range(ticks // 2):
-        loop.tick(1.0)
-    assert loop.setpoint == pytest.approx(1.5, abs=0.005)
-    for _ in range(ticks):
-        loop.tick(1.0)
-    assert loop.setpoint == 2.0
+    values = ramp(Loop().target(1.0, 6.0), 6.0)
+    rates = np.diff(values) / TICK_S
+    assert rates.max() == pytest.approx(SETPOINT_RATE, rel=1e-3)
+    assert np.mean(np.abs(rates - SETPOINT_RATE) < 0.01) > 0.9
+    assert values.max() == 6.0
+
+
+@pytest.mark.parametrize(("start", "target"), [(1.0, 6.0), (6.0, 1.0), (2.0, 2.02)])
+def test_the_setpoint_asks_no_more_acceleration_than_the_plunger_has(
+    start: float, target: float
+) -> None:
+    rates = np.diff(ramp(Loop().target(start, target), target)) / TICK_S
+    flows = rates / kpa_per_ml((start + target) / 2)
+    changes = np.abs(np.diff([0.0, *flows, 0.0])) / TICK_S
+    assert changes.max() < MAX_ACCELERATION
+    assert np.percentile(changes, 95) < 1.05 * RAMP_SHARE * MAX_ACCELERATION
+    # and not much less: it takes the time that a trapezoid of speed takes
+    swept, top = abs(target - start), SETPOINT_RATE
+    acceleration = RAMP_SHARE * MAX_ACCELERATION * kpa_per_ml(start)
+    if swept > top**2 / acceleration:
+        expected = swept / top + top / acceleration
+    else:
+        expected = 2 * (swept / acceleration) ** 0.5
+    assert rates.size * TICK_S == pytest.approx(expected, abs=0.015)
+
+
+@pytest.mark.parametrize(("feed_forward", "growth"), [(0.0, 1.0), (1.0, 1.0), (1.5, 1.5)])
+def test_the_setpoint_asks_no_more_flow_than_the_plunger_has(
+    feed_forward: float, growth: float
+) -> None:
+    board = Board()
+    board.write(max_flow_ml_s=0.5, setpoint_rate_kpa_s=50.0, feed_forward=feed_forward)
+    board.ready()
+    board.command("set_pressure", 5.0)
+    board.run(4000)
+    *_, before, now = board.all("PRESSURE")[::50]
+    stiffness = kpa_per_ml(now["setpoint_kpa"], now["plunger_ml"])
+    rate = now["setpoint_kpa"] - before["setpoint_kpa"]  # in a second
+    assert rate == pytest.approx(RAMP_SHARE * 0.5 * stiffness / growth, rel=0.01)
+
+
+def test_a_target_moved_nearer_is_not_passed() -> None:
+    loop = Loop().target(0.0, 8.0)
+    for _ in range(500):
+        loop.tick(loop.setpoint)
+    here = loop.setpoint
+    loop.retarget(here + 1e-3)
+    for _ in range(500):
+        loop.tick(loop.setpoint)
+        assert loop.setpoint <= here + 1e-3 + 1e-6
+    loop.retarget(here - 1.0)
+    values = ramp(loop, here - 1.0)
+    assert np.all(np.diff(values) <= 1e-6)
 
 
 def test_the_feed_forward_is_the_isothermal_flow_demand_of_the_gas() -> None:
     loop = Loop(kp=0.01, ki=0.0, feed_forward=1.0).target(5.0, 6.0)
     plunger = 4.0
-    flow = loop.tick(loop.setpoint, plunger)
-    expected = (SYSTEM_ML - plunger) / (AMBIENT_KPA + 5.0) * SETPOINT_RATE
+    for _ in range(100):  # beyond its acceleration
+        before = loop.setpoint
+        flow = loop.tick(loop.setpoint, plunger)
+    rate = (loop.setpoint - before) / TICK_S
+    assert rate == pytest.approx(SETPOINT_RATE, rel=1e-3)
+    expected = (SYSTEM_ML - plunger) / (AMBIENT_KPA + loop.setpoint) * rate
     assert flow == pytest.approx(expected, rel=1e-3)
     while loop.setpoint < 6.0:
         loop.tick(6.0, plunger)

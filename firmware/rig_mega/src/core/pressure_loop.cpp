@@ -12,16 +12,36 @@ Pressure outside(Pressure error, Pressure deadband) {
   return {};
 }
 
+constexpr float kRampShare = 0.8f;
+// Below this the drive is faster than any set-point: a plunger may be pushed in further than there
+// is gas if the parameters are wrong.
+constexpr Volume kLeastGas = ml(1.0f);
+
+// Plunger volume for a kPa: the gas by Boyle, and by the feed-forward what grows with it.
+float ml_per_kpa(const Parameters &parameters, Pressure setpoint, Volume gas, float share) {
+  return to_ml(gas) * share / to_kpa(parameters.ambient_pressure() + setpoint);
+}
+
 Flow flow_demand(const Parameters &parameters, const SetpointRamp &setpoint, Volume plunger) {
   if (setpoint.resting()) return {};
   const Volume gas = parameters.system_volume() - plunger;
   if (gas < Volume{}) return {};
-  const Pressure absolute = parameters.ambient_pressure() + setpoint.value();
-  const float compression_per_s = setpoint.rate().value / to_kpa(absolute);
-  return ml_s(to_ml(gas) * parameters.feed_forward() * compression_per_s);
+  return ml_s(ml_per_kpa(parameters, setpoint.value(), gas, parameters.feed_forward()) *
+              setpoint.rate().value);
 }
 
 }  // namespace
+
+RampLimits ramp_limits(const Parameters &parameters, Pressure setpoint, Volume plunger) {
+  const Volume gas = parameters.system_volume() - plunger;
+  const float share = parameters.feed_forward() > 1.0f ? parameters.feed_forward() : 1.0f;
+  const float kpa_per_ml =
+      kRampShare / ml_per_kpa(parameters, setpoint, gas < kLeastGas ? kLeastGas : gas, share);
+  const PressureRate followed = kpa_s(to_ml_s(parameters.max_flow()) * kpa_per_ml);
+  const PressureRate wanted = parameters.setpoint_rate();
+  const Flow change = parameters.max_flow_acceleration() * kTick;
+  return {followed < wanted ? followed : wanted, kpa_s(to_ml_s(change) * kpa_per_ml)};
+}
 
 void PressureLoop::reset() {
   integral_ = {};

@@ -5,6 +5,7 @@
 // e is the error outside the deadband. The feed-forward is the isothermal flow demand of a gas
 // volume V. The integral stands still while the set-point moves (what it would learn there is the
 // error of the feed-forward, and it would overshoot by it) and while the plunger cannot follow.
+// The set-point moves only as the plunger can follow: it would run on otherwise, and overshoot.
 #pragma once
 
 #include "parameters.h"
@@ -12,6 +13,10 @@
 #include "units.h"
 
 namespace rig {
+
+// What the set-point may ask of a plunger there: most of its flow and acceleration, the rest is the
+// feedback's.
+RampLimits ramp_limits(const Parameters &parameters, Pressure setpoint, Volume plunger);
 
 class PressureLoop {
  public:

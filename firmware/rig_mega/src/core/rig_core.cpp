@@ -181,7 +181,9 @@ void RigCore::regulate() {
     motion_.stop();  // until the monitor has made up its mind
     return;
   }
-  setpoint_.tick(parameters_.setpoint_rate());
+  if (!setpoint_.resting()) {
+    setpoint_.tick(ramp_limits(parameters_, setpoint_.value(), motion_.position()));
+  }
   motion_.set_velocity(loop_.tick(parameters_, setpoint_, transducer_.pressure(),
                                   motion_.position(), motion_.blocked()));
 }
