@@ -167,7 +167,8 @@ def identify_level(
 ) -> Fit:
     """The model with as many terms as the recording supports.
 
-    `least_delay_s` is what is known of the delay without any experiment. Raises ControlError if no model can be fitted.
+    `least_delay_s` is what is known of the delay without any experiment. Raises ControlError if no
+    model can be fitted.
     """
     fits = {terms: _fit(recording, terms, least_delay_s) for terms in range(most_terms + 1)}
     alternatives = {terms: fit.criterion for terms, fit in fits.items() if fit is not None}
