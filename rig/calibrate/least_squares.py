@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from rig.calibrate.errors import CalibrateError
 from rig.spec.calibration import Fit
+from rig.spec.student import widening
 
 Array = NDArray[np.float64]
 
@@ -96,11 +96,6 @@ def least_squares(
     covariance = variance * (inverse @ inverse.T) / np.outer(scale, scale)
     dof = max(1.0, points * share - parameters)
     return LinearFit(tuple(columns), values, covariance, residuals, dof)
-
-
-def widening(dof: float) -> float:
-    """How much wider Student's 95 % interval is than the normal one."""
-    return float(stdtrit(dof, 0.975) / 1.959964)
 
 
 def _independent_share(residuals: Array) -> float:

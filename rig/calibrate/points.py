@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.calibrate.errors import CalibrateError
-from rig.calibrate.least_squares import widening
+from rig.spec.student import widening
 
 Array = NDArray[np.float64]
 Row = dict[str, float | str]

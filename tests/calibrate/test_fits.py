@@ -13,7 +13,7 @@ from rig.calibrate.air import BUOYANCY
 from rig.calibrate.curve import fit_curve
 from rig.calibrate.dead_weight import Piston
 from rig.calibrate.errors import CalibrateError
-from rig.calibrate.least_squares import least_squares, widening
+from rig.calibrate.least_squares import least_squares
 from rig.calibrate.load_cell import fit_creep, fit_load_cell, grams_force
 from rig.calibrate.points import Row, above_zero, read_points
 from rig.calibrate.syringe import Surroundings, fit_syringe, shown_density, water_density
@@ -22,6 +22,7 @@ from rig.spec.calibration import Provenance, TransducerCalibration
 from rig.spec.calibration_file import calibration_text, free_path, write_calibration
 from rig.spec.errors import SpecError
 from rig.spec.loading import parse_calibration
+from rig.spec.student import widening
 
 # GUM (JCGM 100:2008) Table H.6: thermometer readings and corrections, degrees Celsius.
 GUM_READINGS = [
