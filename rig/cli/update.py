@@ -94,12 +94,17 @@ def update(
         if study is None
         else _surfaces(study, results, setup, priors)
     )
-    found = update_model(forward, measured, mcmc=mcmc, seed=seed)
+    beyond = measured.count - forward.covered(measured).count
+    found = update_model(forward, forward.covered(measured), mcmc=mcmc, seed=seed)
+    unseen = {name: forward.covered(levels) for name, levels in unseen.items()}
     foretold = {name: found.predict(levels) for name, levels in unseen.items()}
     if as_json:
-        typer.echo(json.dumps(_plain(found, foretold), indent=2))
-    else:
-        _show(found, foretold)
+        told = {**_plain(found, foretold), "levels_left_out": beyond}
+        typer.echo(json.dumps(told, indent=2))
+        return
+    if beyond:
+        typer.echo(f"{beyond} levels are left out: the study has no answers at their pressures.")
+    _show(found, foretold)
 
 
 def _surfaces(file: Path, results: Path | None, setup: Setup, priors: Priors) -> Forward:

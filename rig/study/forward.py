@@ -59,6 +59,10 @@ class Forward(Protocol):
         """Lowest and highest value of each unknown that the model is good for, (k, 2)."""
         ...
 
+    def covered(self, at: Measured) -> Measured:
+        """The levels at pressures that the model has answers for."""
+        ...
+
     def parameters(self, unit: Array) -> dict[str, float]:
         """Physical values of the unknowns, and of what follows from them, SI."""
         ...
@@ -125,6 +129,10 @@ class BeamForward:
     def bounds(self) -> Array:
         """Far from anything likely."""
         return np.tile([-REACH, REACH], (len(self.names), 1))
+
+    def covered(self, at: Measured) -> Measured:
+        """All."""
+        return at
 
     def error(self, at: Measured) -> tuple[Array, Array]:
         """None is known; where the model misses the levels, their uncertainties are widened."""

@@ -34,6 +34,18 @@ class Measured:
         """Levels in all."""
         return self.angle.size + self.force.size
 
+    def only(self, angles: NDArray[np.bool_], forces: NDArray[np.bool_]) -> Measured:
+        """The levels that masks (n,) and (m,) keep."""
+        return replace(
+            self,
+            angle_pressure=self.angle_pressure[angles],
+            angle=self.angle[angles],
+            angle_u=self.angle_u[angles],
+            force_pressure=self.force_pressure[forces],
+            force=self.force[forces],
+            force_u=self.force_u[forces],
+        )
+
 
 def read_measured(run: Path) -> Measured:
     """Levels of a run's summary, both branches; raises StudyError where there are none."""
@@ -66,17 +78,6 @@ def without_pressures(run: Measured, held_out: Array) -> tuple[Measured, Measure
         """Levels (rows) against pressures to hold out (columns)."""
         return np.asarray(np.abs(pressure[:, None] - held_out[None, :]) < 200.0)
 
-    def only(angles: NDArray[np.bool_], forces: NDArray[np.bool_]) -> Measured:
-        return replace(
-            run,
-            angle_pressure=run.angle_pressure[angles],
-            angle=run.angle[angles],
-            angle_u=run.angle_u[angles],
-            force_pressure=run.force_pressure[forces],
-            force=run.force[forces],
-            force_u=run.force_u[forces],
-        )
-
     of_angle, of_force = near(run.angle_pressure), near(run.force_pressure)
     missed = held_out[~(of_angle.any(axis=0) | of_force.any(axis=0))]
     if missed.size:
@@ -85,7 +86,7 @@ def without_pressures(run: Measured, held_out: Array) -> tuple[Measured, Measure
             f"you want to hold out."
         )
     angles, forces = np.any(of_angle, axis=1), np.any(of_force, axis=1)
-    return only(~angles, ~forces), only(angles, forces)
+    return run.only(~angles, ~forces), run.only(angles, forces)
 
 
 def require_same_actuator(one: Setup, other: Setup) -> None:

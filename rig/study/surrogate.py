@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.mechanics.table import GRAM_FORCE
 from rig.spec.actuator import ActuatorSpec
@@ -85,14 +86,19 @@ class Curve:
         """The surfaces' error in SI, (m,)."""
         return np.asarray(self.factor * np.interp(pressure, self.pressure, self.error))
 
-    def _require_covered(self, pressure: Array) -> None:
+    def covers(self, pressure: Array) -> NDArray[np.bool_]:
+        """Pressures that the responses reach, or nearly so, (m,)."""
         low, high = float(self.pressure[0]), float(self.pressure[-1])
         slack = _BEYOND * (high - low)
-        wrong = pressure[(pressure < low - slack) | (pressure > high + slack)]
+        return np.asarray((pressure >= low - slack) & (pressure <= high + slack))
+
+    def _require_covered(self, pressure: Array) -> None:
+        wrong = pressure[~self.covers(pressure)]
         if wrong.size:
             raise StudyError(
                 f"the run has {self.quantity} at {wrong[0] / 1e3:.4g} kPa, the study from "
-                f"{low / 1e3:g} to {high / 1e3:g} kPa; add responses, or hold these levels out."
+                f"{self.pressure[0] / 1e3:g} to {self.pressure[-1] / 1e3:g} kPa; add responses, or "
+                f"leave these levels out."
             )
 
 
@@ -159,6 +165,10 @@ class SurfaceForward:
             step = self.prior[name] * getattr(self.priors, name)
             found.append([(level - self.prior[name]) / step for level in (factor.low, factor.high)])
         return np.array([*found, [-REACH, REACH]])
+
+    def covered(self, at: Measured) -> Measured:
+        """Levels between the study's pressures."""
+        return at.only(self.angles.covers(at.angle_pressure), self.forces.covers(at.force_pressure))
 
     def parameters(self, unit: Array) -> dict[str, float]:
         """Physical values, SI."""

@@ -25,7 +25,7 @@ AT_50_KPA = np.array([5e3, 15e3, 30e3, 50e3])
 def test_our_thirteen_cases_lead_to_the_published_conclusions_and_a_better_design() -> None:
     """All terms significant as printed; sums of squares within 10 %.
 
-    F is not within 2.5 %, but 7 to 20 % above the print: our displacements differ by 0.05 mm RMS,
+    F is not within 2.5 %, but 5 to 20 % above the print: our displacements differ by 0.05 mm RMS,
     and the residual that F divides by is 0.3 mm only, 12 % less than the printed one.
     """
     designs = table_2()

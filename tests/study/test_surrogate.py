@@ -118,6 +118,10 @@ def test_a_run_beyond_the_levels_is_told_of(tmp_path: Path) -> None:
     forward = SurfaceForward.of(finished(tmp_path), ACTUATOR, MATERIAL, Priors(wall=0.05))
     run = measured(0, np.linspace(0.5e3, 8e3, 9), wall=1.65e-3)
     assert "wall" in update_model(forward, run).at_bounds
+    long = measured(0, np.array([3e3, 6e3, 8.1e3, 9e3]))
+    kept = forward.covered(long)
+    assert kept.angle_pressure == pytest.approx([3e3, 6e3, 8.1e3])
+    assert kept.force == pytest.approx(long.force[:3])
     with pytest.raises(StudyError, match="at 9 kPa, the study from 0 to 8 kPa"):
         update_model(forward, measured(0, np.array([3e3, 6e3, 9e3])))
 
