@@ -65,6 +65,15 @@ def test_the_bottom_of_a_bowl_is_found(how: str, near: float) -> None:
     assert 1e3 * best.point.values["radius"] == pytest.approx(6.0, abs=near)
 
 
+def test_an_optimum_on_two_bounds_is_met_exactly_where_answers_are_dear() -> None:
+    def slope(task: Task) -> Mapping[str, float]:
+        geometry = task.actuator.geometry
+        return {"a": -1e3 * (geometry.wall_thickness + geometry.average_radius)}
+
+    (best,) = run([BOWL], "bayesian", function=slope).best
+    assert best.point.values == pytest.approx({"wall": 2e-3, "radius": 7e-3}, rel=1e-12)
+
+
 @pytest.mark.parametrize(("how", "near"), [("cobyla", 0.02), ("nsga2", 0.12), ("bayesian", 0.3)])
 def test_a_limit_is_kept(how: str, near: float) -> None:
     """The bowl's bottom at a radius of 6 mm is forbidden; the best is on the limit of 6.5 mm."""
