@@ -15,7 +15,8 @@ from rig.board.disturbance import Disturbance, LineHistory, disturbance_of
 from rig.board.simulated import SimulatedBoard
 from rig.link.schema import load_schema
 from rig.link.slcan import SlcanParser
-from rig.plant.plant import REFERENCE_LEAK_PRESSURE, Faults, Plant, Switch, Truth
+from rig.plant.parameters import REFERENCE_LEAK_PRESSURE
+from rig.plant.plant import Faults, Plant, Switch, Truth
 from rig.spec.faults import (
     AnyFault,
     BoardFault,

@@ -1,11 +1,11 @@
-"""The virtual bench's physics, stepped in C at 1 ms; this wraps it and fills its parameters.
+"""The virtual bench's physics, stepped in C; this wraps it and fills its parameters.
 
 The truth it holds is read by `rig.board` for a file of its own and by tests, never by experiments.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import IntEnum
 from typing import Any, Protocol
 
@@ -14,19 +14,16 @@ from numpy.typing import NDArray
 
 from rig.plant._plant import ffi, lib
 from rig.plant.instruments import Instruments
+from rig.plant.parameters import (
+    actuator_parameters,
+    drive_parameters,
+    fluid_parameters,
+    sensor_parameters,
+)
 from rig.plant.specimen import Specimen
 from rig.spec.bench import BenchSpec
-from rig.spec.quantity import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
-AIR_VISCOSITY = 1.82e-5
-"""Pa s at 20 degC (CRC Handbook of Chemistry and Physics)."""
-REFERENCE_LEAK_PRESSURE = 10e3
-"""Gauge pressure in Pa at which a bench spec states its leak."""
-RESPONSE_TIME = 0.02
-"""s by which the shape lags the pressure: a guess until the mass and damping are modelled."""
-PLAY_RADII = (0.05, 0.15, 0.30)
-"""Radii of the hysteresis' play operators, relative to the actuator's pressure limit."""
 TABLE_LENGTH = int(lib.PLANT_TABLE)
 
 
@@ -89,6 +86,30 @@ class Truth:
     valve_opened: float
     """Plant time at which the closed valve was last opened; 0 if never."""
     valve_open: bool
+    tube_flow: float
+    """m3/s, to the actuator."""
+    shape_pressure: float
+    """Gauge pressure at which the quasi-static actuator has the shape of now."""
+    load_cycles: float
+    """How often the actuator's pressure limit was gone to and back, or as much in smaller parts."""
+    missed_pulses: float
+    """Of the stepper, for want of torque."""
+    dissolved_moles: float
+    liquid_volume: float
+    """As at ambient pressure."""
+    energy: float
+    """Internal energy of the air, J; here and below 0 with a liquid."""
+    work: float
+    """Done on the air since power-on, J."""
+    heat: float
+    """Taken up by the air from the walls since power-on, J."""
+    enthalpy_out: float
+    """Gone to ambient since power-on, J."""
+    moles_out: float
+    """Gone to ambient since power-on, also in solution."""
+
+
+_TRUTHS = tuple(field.name for field in fields(Truth) if field.name != "valve_open")
 
 
 class ResponseTables(Protocol):
@@ -121,13 +142,13 @@ class Plant:
             ffi.memmove(getattr(self._response, name), ffi.from_buffer(values), values.nbytes)
         self._plant = ffi.gc(lib.plant_new(self._parameters, self._response, seed), lib.plant_free)
         self._truth = ffi.new("plant_truth *")
-        self._idle = ffi.new("rig_pins_out *", {"valve_open": 1})
+        self._step_pins = ffi.new("rig_pins_out *", {"motor_enabled": 1})
         self._pins = ffi.new("rig_pins_in *")
 
     @property
     def step_address(self) -> int:
         """Address of the C function that advances the bench by 1 ms (a rig_bench_fn)."""
-        return int(ffi.cast("uintptr_t", ffi.addressof(lib, "plant_do_step")))
+        return int(ffi.cast("uintptr_t", ffi.addressof(lib, "plant_tick")))
 
     @property
     def state_address(self) -> int:
@@ -145,6 +166,22 @@ class Plant:
         lib.plant_run(self._plant, out, self._pins, milliseconds)
         return self._pins
 
+    def do_step(
+        self, time: float, step: float, *, pulses: float = 0.0, valve_open: bool = False
+    ) -> None:
+        """Advance the physics alone by `step` s from `time` s, which must be now, as an FMU does.
+
+        The `pulses`, evenly spread, need not be whole. Raises ValueError for another time, or for a
+        step that is not above 0 and at most 5 ms.
+        """
+        out = self._step_pins
+        out.valve_open = valve_open
+        if not lib.plant_do_step(self._plant, time, step, pulses, out):
+            raise ValueError(
+                f"a step of {step:g} s from {time:g} s was asked of a plant that is at "
+                f"{self.truth().time:g} s; expected a step of at most 5 ms from there"
+            )
+
     def set_fixture(self, fixture: Fixture) -> None:
         """Free the tip, or block it against the load cell."""
         lib.plant_set_fixture(self._plant, int(fixture))
@@ -161,20 +198,7 @@ class Plant:
         """What is really so now."""
         lib.plant_get_truth(self._plant, self._truth)
         t = self._truth
-        return Truth(
-            t.time,
-            t.gauge_pressure,
-            t.angle,
-            t.force,
-            t.actuator_volume,
-            t.pushed_volume,
-            t.gas_moles,
-            t.temperature,
-            t.actuator_pressure,
-            t.peak_pressure,
-            t.valve_opened,
-            bool(t.valve_open),
-        )
+        return Truth(valve_open=bool(t.valve_open), **{name: getattr(t, name) for name in _TRUTHS})
 
     def save(self) -> bytes:
         """The whole state, random generator included."""
@@ -204,49 +228,10 @@ def plant_parameters(
     """
     assert bench.virtual is not None
     virtual = bench.virtual
-    sensors = virtual.sensors
-    radius = bench.tubing.inner_diameter / 2
-    tube_resistance = 8 * AIR_VISCOSITY * bench.tubing.length / (np.pi * radius**4)
-    counts_per_newton = instruments.counts_per_gram / (1e-3 * STANDARD_GRAVITY)
-    return {
-        "ambient_pressure": bench.ambient.pressure,
-        "ambient_temperature": bench.ambient.temperature,
-        "volume_per_step": instruments.volume_per_step,
-        "backlash_volume": instruments.backlash,
-        "syringe_volume": bench.syringe.volume,
-        "dead_volume": instruments.dead_volume,
-        "start_volume": instruments.start_volume,
-        "tube_volume": bench.tubing.volume,
-        "tube_resistance": tube_resistance,
-        # the valve vents through a short piece of the same tube (a guess; the paper has no valve)
-        "valve_resistance": tube_resistance,
-        "leak_conductance": virtual.pneumatics.leak / REFERENCE_LEAK_PRESSURE,
-        "heat_exchange_time": virtual.pneumatics.heat_exchange_time,
-        "response_time": RESPONSE_TIME,
-        "creep_share": specimen.creep_share if specimen else 0.0,
-        "creep_time": specimen.creep_time if specimen else 1.0,
-        "play_share": specimen.hysteresis if specimen else 0.0,
-        "play_radius": [r * pressure_limit for r in PLAY_RADII],
-        "transducer_gain": instruments.transducer_gain,
-        "transducer_voltage_at_zero": instruments.voltage_at_zero,
-        "transducer_noise": sensors.transducer_noise,
-        "transducer_bow": instruments.transducer_bow,
-        "transducer_span": bench.transducer.pressure_high,
-        "transducer_drift": sensors.transducer_drift,
-        "adc_reference": bench.adc.reference,
-        "adc_levels": 2.0**bench.adc.bits,
-        "counts_per_newton": counts_per_newton,
-        "load_cell_zero_counts": instruments.load_cell_zero_counts,
-        "load_cell_noise_counts": sensors.load_cell_noise * STANDARD_GRAVITY * counts_per_newton,
-        "load_cell_creep_share": instruments.load_cell_creep,
-        "load_cell_creep_time": sensors.load_cell_creep_time,
-        "load_cell_bow": instruments.load_cell_bow * STANDARD_GRAVITY,
-        "load_cell_span": bench.load_cell.capacity * STANDARD_GRAVITY,
-        "load_cell_drift": sensors.load_cell_drift * STANDARD_GRAVITY,
-        "load_cell_period": 1 / bench.load_cell.sample_rate,
-        "bad_word_probability": min(
-            1.0,
-            1 / (bench.load_cell.sample_rate * sensors.bad_word_interval),
-        ),
-        "drift_time": sensors.drift_time,
-    }
+    return (
+        fluid_parameters(bench, virtual.pneumatics)
+        | drive_parameters(bench, virtual.drive, instruments)
+        | actuator_parameters(bench, virtual.specimen, specimen, pressure_limit)
+        | sensor_parameters(bench, virtual.sensors, instruments)
+        | {"substeps": virtual.substeps}
+    )

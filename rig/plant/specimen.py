@@ -53,6 +53,8 @@ class Specimen:
     """As printed."""
     young_modulus: float
     """As printed, Pa."""
+    density: float
+    """Of its material, kg/m3."""
     creep_share: float
     """Share of the response that comes by creep."""
     creep_time: float
@@ -118,6 +120,7 @@ def draw_specimen(
         volume_blocked=tables.volume_blocked,
         geometry=geometry,
         young_modulus=material.young_modulus.value * stiffness,
+        density=material.density.value,
         creep_share=variation.creep,
         creep_time=variation.creep_time,
         hysteresis=variation.hysteresis,

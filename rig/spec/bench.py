@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from rig.spec.base import Count, Integer, Name, Number, SpecModel, require
+from rig.spec.physics import Air, CreepTerm, Liquid, MotorTorque, Mullins, PlungerFriction
 from rig.spec.quantity import (
     Acceleration,
     Angle,
@@ -202,7 +203,26 @@ class SpecimenVariation(SpecModel):
     young_modulus: Ratio = Field(ge=0, description="relative, of all stiffness")
     creep: Ratio = Field(ge=0, description="share of the response that comes by creep")
     creep_time: Duration = Field(gt=0)
+    more_creep: tuple[CreepTerm, ...] = Field(
+        (), max_length=3, description="terms of the Prony series besides that one"
+    )
     hysteresis: Ratio = Field(ge=0, description="loop width relative to the response")
+    response_time: Duration = Field(
+        0.02, ge=0, description="by which damping lets the shape lag the pressure"
+    )  # a guess: damping ratio of about 0.7 with the mass of the shipped actuators
+    inertia: bool = Field(False, description="the actuator's mass counts")
+    mullins: Mullins | None = None
+    ageing: Ratio = Field(0.0, ge=0, description="growth of the response per decade of load cycles")
+
+    @model_validator(mode="after")
+    def _something_is_elastic(self) -> SpecimenVariation:
+        total = self.creep + sum(term.share for term in self.more_creep)
+        require(
+            total < 1,
+            f"creep takes {total:.3g} of the response; expected creep and more_creep together "
+            "below 1",
+        )
+        return self
 
 
 class FiniteElementSpecimen(SpecimenVariation):
@@ -223,10 +243,21 @@ class BeamSpecimen(SpecimenVariation):
 
 
 class VirtualPneumatics(SpecModel):
-    """How simulated air differs from an ideal isothermal gas in a tight system."""
+    """How what fills the simulated bench differs from an isothermal gas in a tight system."""
 
     heat_exchange_time: Duration = Field(gt=0, description="gas to wall, time constant")
     leak: Flow = Field(ge=0, description="at 10 kPa gauge, ambient conditions")
+    turbulence: bool = Field(False, description="fast flow in the tube may be turbulent")
+    minor_loss: Number = Field(
+        0.0, ge=0, description="of ends, bends and fittings of the tube, per dynamic pressure"
+    )
+    inertia: bool = Field(False, description="what flows in the tube has a mass")
+    valve_conductance: FlowGain = Field(
+        2e-9, gt=0, description="sonic conductance of the open valve, ISO 6358"
+    )  # a guess: 0.2 dm3/(s bar), an orifice of about 1 mm
+    valve_critical_ratio: Ratio = Field(
+        0.3, ge=0, lt=1, description="of pressures at which its flow is sonic, ISO 6358"
+    )  # a guess: typical of small solenoid valves
 
 
 class VirtualSensors(SpecModel):
@@ -255,11 +286,16 @@ class VirtualSensors(SpecModel):
 
 
 class VirtualDrive(SpecModel):
-    """How the simulated plunger's drive differs from its drawing; relative standard deviations."""
+    """How the simulated plunger's drive differs from its drawing; plain numbers are relative
+    standard deviations."""
 
     volume_per_step: Ratio = Field(ge=0)
     dead_volume: Ratio = Field(ge=0)
     backlash: Ratio = Field(ge=0)
+    friction: PlungerFriction | None = Field(
+        None, description="none: the seal goes where the nut takes it"
+    )
+    torque: MotorTorque | None = Field(None, description="none: the motor follows every pulse")
 
 
 class VirtualReferences(SpecModel):
@@ -314,6 +350,7 @@ class VirtualBench(SpecModel):
     sensors: VirtualSensors
     references: VirtualReferences
     optics: VirtualOptics
+    substeps: Count = Field(1, le=100, description="of the physics in a millisecond")
 
 
 class BenchSpec(SpecModel):
@@ -334,6 +371,7 @@ class BenchSpec(SpecModel):
     controller: Controller
     safety: Safety
     ambient: Ambient
+    fluid: Annotated[Air | Liquid, Field(discriminator="kind")] = Air()
     virtual: VirtualBench | None = None
 
     @property
@@ -370,6 +408,11 @@ class BenchSpec(SpecModel):
             problems.append(
                 f"board.kind is '{self.board.kind}' but camera.device.kind is "
                 f"'{self.camera.device.kind}'; expected both simulated or both real"
+            )
+        if isinstance(self.fluid, Liquid) and self.controller.feed_forward > 0:
+            problems.append(
+                "the fluid is a liquid, but controller.feed_forward is the flow that compresses a "
+                "gas; expected 0"
             )
         require(not problems, "; ".join(problems))
         return self

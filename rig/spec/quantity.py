@@ -152,6 +152,10 @@ _DIMENSIONS = {
     "V": "voltage",
     "kg": "mass",
     "N": "force",
+    "N*m": "torque",
+    "N*s/m": "friction per speed",
+    "m/N": "travel per force",
+    "Pa*s": "viscosity",
     "m**3/s": "flow",
     "m**3/s/Pa": "flow per pressure",
     "m**3/s**2/Pa": "flow per pressure and time",
@@ -269,6 +273,11 @@ Temperature = Annotated[float, Unit("K", "degC", "temperature", "23")]
 Voltage = Annotated[float, Unit("V", "V", "voltage", "5")]
 Angle = Annotated[float, Unit("rad", "deg", "angle")]
 Mass = Annotated[float, Unit("kg", "g", "mass")]
+Force = Annotated[float, Unit("N", "N", "force")]
+Torque = Annotated[float, Unit("N*m", "N*m", "torque", "0.4")]
+ViscousFriction = Annotated[float, Unit("N*s/m", "N*s/m", "friction per speed", "50")]
+Compliance = Annotated[float, Unit("m/N", "mm/N", "travel per force", "0.001")]
+Viscosity = Annotated[float, Unit("Pa*s", "mPa*s", "viscosity", "1")]
 Flow = Annotated[float, Unit("m**3/s", "mL/s", "flow", "8")]
 FlowGain = Annotated[float, Unit("m**3/s/Pa", "mL/s/kPa", "flow per pressure", "1.2")]
 FlowIntegralGain = Annotated[

@@ -33,7 +33,10 @@ ffibuilder.set_source(
     source_extension=".cpp",
     sources=["rig/plant/native/plant.cpp"],
     include_dirs=["rig/plant/native", "firmware/host"],
-    depends=["rig/plant/native/plant.h", "rig/plant/native/random.h", "firmware/host/rig_host.h"],
+    depends=[
+        *(f"rig/plant/native/{header.name}" for header in sorted(NATIVE.glob("*.h"))),
+        "firmware/host/rig_host.h",
+    ],
     extra_compile_args=["-std=c++17", "-O2", "-Wall", "-Wextra"],
 )
 

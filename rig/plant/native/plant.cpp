@@ -1,10 +1,8 @@
-// The virtual bench; see plant.h for what the parameters mean.
+// The virtual bench put together; see plant.h for what the parameters mean.
 //
-// Gas: two nodes, syringe with tube and actuator, joined by a laminar resistance. Each node holds
-// moles n and temperature T; p = n R T / V. Its temperature follows the adiabatic change of volume
-// and moles, relaxing to ambient:  dT = (gamma - 1) T (dn/n - dV/V) + (Ta - T) dt / tau.
-// Actuator: gauge pressure passes play operators (hysteresis, Prandtl-Ishlinskii) and one Prony
-// term (creep); the result drives the quasi-static response tables.
+// The fluid is in two nodes, syringe with tube and actuator. A step is symmetric (Strang, SIAM J.
+// Numer. Anal. 5 (1968) 506): what flows to ambient and heat for half of it, half the plunger's
+// way, tube and wall together for the whole of it, and the rest in reverse order.
 
 #include "plant.h"
 
@@ -13,71 +11,33 @@
 #include <cstring>
 #include <type_traits>
 
-#include "random.h"
+#include "actuator.h"
+#include "drive.h"
+#include "flow.h"
+#include "fluid.h"
+#include "sensors.h"
 
 namespace {
 
-constexpr double kStep = 1e-3;
-constexpr double kGasConstant = 8.314462618;
-constexpr double kGamma = 1.4;
-constexpr int kConversionsPerStep = 9;  // 104 us each on a Mega
-constexpr double kDriftPeriod = 0.1;    // s between two steps of the zeros' drift
+constexpr double kLongestStep = 5e-3;
 
-double lookup(const double *table, double low, double high, double x) {
+double lookup(const double *table, double low, double high, double x, double *slope = nullptr) {
   const double position = (x - low) / (high - low) * (PLANT_TABLE - 1);
   const double clamped = std::min(std::max(position, 0.0), PLANT_TABLE - 1.000001);
   const int index = static_cast<int>(clamped);
-  const double weight = clamped - index;
-  return table[index] + weight * (table[index + 1] - table[index]);
+  const double weight = clamped - index, rise = table[index + 1] - table[index];
+  if (slope) *slope = rise * (PLANT_TABLE - 1) / (high - low);
+  return table[index] + weight * rise;
 }
-
-// How much less than `value` a sensor with a bow shows: a parabola through 0 and `span`.
-double bow_at(double value, double bow, double span) {
-  const double x = value / span;
-  return bow * 4 * x * (1 - x);
-}
-
-// A zero that wanders as an Ornstein-Uhlenbeck process, stationary from the start: two values far
-// apart in time differ with the standard deviation `change`.
-struct Drift {
-  double value;
-
-  void begin(Random &random, double change) { value = change * std::sqrt(0.5) * random.normal(); }
-  void step(Random &random, double change, double correlation_time) {
-    const double kept = std::exp(-kDriftPeriod / correlation_time);
-    value = kept * value + change * std::sqrt(0.5 * (1 - kept * kept)) * random.normal();
-  }
-};
-
-struct Gas {
-  double moles, temperature, volume;
-
-  double pressure() const { return moles * kGasConstant * temperature / volume; }
-
-  void change(double new_moles, double new_volume, double ambient_temperature, double relaxation) {
-    const double compression =
-        (new_moles - moles) / moles - (new_volume - volume) / volume;
-    temperature += (kGamma - 1) * temperature * compression;
-    temperature += (ambient_temperature - temperature) * relaxation;
-    moles = new_moles;
-    volume = new_volume;
-  }
-};
 
 struct State {
   double time;
-  Random random;
-  Gas syringe, actuator;
-  double motor_volume, pushed_volume;  // where the motor is, where the plunger is (backlash)
-  double play[PLANT_PLAYS];
-  double creep, shape_pressure;  // gauge pressures in Pa
-  double held_voltage;
-  double cell_creep, next_word_time;
-  double cell_load;       // N, of masses placed on the load cell
-  Random drift_random;    // of its own, so that drift leaves the noise as it is
-  Drift transducer_zero, cell_zero;
-  double next_drift_time;
-  double drift;  // Pa that the transducer reads too much
+  Node syringe, actuator;
+  double tube_flow;  // m3/s, to the actuator, at the mean of its ends' pressures
+  Drive drive;
+  Wall wall;
+  Sensors sensors;
+  Ledger ledger;
   double peak_pressure, valve_opened;
   int32_t valve_open;
   plant_fixture fixture;
@@ -91,189 +51,161 @@ struct plant {
   plant_parameters par;
   plant_response response;
   State now;
+  Shares shares;
 
   double shape(const double *table, double gauge) const {
     return lookup(table, response.table_low, response.table_high, gauge);
   }
-  double actuator_volume(double gauge) const {
-    return shape(now.fixture == PLANT_BLOCKED ? response.volume_blocked : response.volume_free,
-                 gauge);
+  Felt actuator_volume(double gauge) const {
+    Felt found;
+    found.value = lookup(
+        now.fixture == PLANT_BLOCKED ? response.volume_blocked : response.volume_free,
+        response.table_low, response.table_high, gauge, &found.slope);
+    return found;
   }
   double syringe_volume() const {
-    return par.dead_volume + par.tube_volume + par.syringe_volume - now.pushed_volume;
+    return par.dead_volume + par.tube_volume + par.syringe_volume - now.drive.pushed_volume;
   }
-  double gauge() const { return now.syringe.pressure() - par.ambient_pressure; }
-  double actuator_gauge() const { return now.actuator.pressure() - par.ambient_pressure; }
+  double gauge() const { return now.syringe.pressure(par) - par.ambient_pressure; }
+  double actuator_gauge() const { return now.actuator.pressure(par) - par.ambient_pressure; }
   double angle() const {
-    return shape(response.angle, now.fixture == PLANT_BLOCKED ? 0.0 : now.shape_pressure);
+    return shape(response.angle, now.fixture == PLANT_BLOCKED ? 0.0 : now.wall.shape);
   }
   double force() const {
-    return now.fixture == PLANT_BLOCKED ? shape(response.blocked_force, now.shape_pressure) : 0.0;
+    return now.fixture == PLANT_BLOCKED ? shape(response.blocked_force, now.wall.shape) : 0.0;
   }
 
   plant(const plant_parameters &p, const plant_response &r, uint64_t seed)
-      : par(p), response(r), now{0, Random(seed), {}, {}, 0, 0, {}, 0, 0, 0, 0, 0, 0,
-                                Random(seed ^ 0x5DEECE66Du), {}, {}, kDriftPeriod,
-                                0, 0, 0, 1, PLANT_FREE, {}} {
-    now.motor_volume = now.pushed_volume = par.start_volume;
-    now.syringe = at_ambient(syringe_volume());
-    now.actuator = at_ambient(actuator_volume(0));
-    now.held_voltage = par.transducer_voltage_at_zero;
-    now.next_word_time = par.load_cell_period * (0.5 + 0.5 * now.random.uniform());
-    now.cell_creep = force();
-    now.transducer_zero.begin(now.drift_random, par.transducer_drift);
-    now.cell_zero.begin(now.drift_random, par.load_cell_drift);
+      : par(p), response(r), now{0, {}, {}, 0, {}, {}, Sensors(seed), {}, 0, 0, 1, PLANT_FREE, {}} {
+    now.drive.motor_volume = now.drive.pushed_volume = par.start_volume;
+    now.syringe = filling(par, syringe_volume());
+    now.actuator = filling(par, actuator_volume(0).value);
+    now.sensors.begin(par, force());
   }
 
-  void wander() {
-    if (now.time < now.next_drift_time) return;
-    now.next_drift_time += kDriftPeriod;
-    now.transducer_zero.step(now.drift_random, par.transducer_drift, par.drift_time);
-    now.cell_zero.step(now.drift_random, par.load_cell_drift, par.drift_time);
+  bool joined() const {
+    return !now.faults.tube_off && !now.faults.tube_blocked && now.fixture != PLANT_PLUGGED;
   }
 
-  Gas at_ambient(double volume) const {
-    return {par.ambient_pressure * volume / (kGasConstant * par.ambient_temperature),
-            par.ambient_temperature, volume};
+  void flow_from_open_ends(double h) {
+    if (!now.faults.tube_off) return;
+    const auto open_end = [&](double, double) { return par.tube_resistance; };
+    bleed(par, now.syringe, h, now.ledger, open_end);
+    bleed(par, now.actuator, h, now.ledger, open_end);
   }
 
-  void move_plunger(const rig_pins_out &out) {
-    if (!out.motor_enabled) return;
-    now.motor_volume += (1.0 - now.faults.lost_steps) * out.steps * par.volume_per_step;
-    // hard stops: beyond them the stepper loses steps
-    now.motor_volume =
-        std::min(std::max(now.motor_volume, -par.backlash_volume), par.syringe_volume);
-    // the nut pushes at the motor's position and pulls one backlash later
-    now.pushed_volume = std::max(now.pushed_volume, now.motor_volume);
-    now.pushed_volume = std::min(now.pushed_volume, now.motor_volume + par.backlash_volume);
-    now.pushed_volume = std::min(std::max(now.pushed_volume, 0.0), par.syringe_volume);
+  void flow_through_valve(double h, bool open) {
+    if (!open) return;
+    const double temperature = now.syringe.temperature(par);
+    bleed(par, now.syringe, h, now.ledger, [&](double p, double gauge) {
+      return valve_resistance(par, temperature, p, gauge);
+    });
   }
 
-  // Moles that pass a resistance from pressure `high` to `low` in one step; never more than what
-  // levels the pressures, so that a wide-open valve stays stable at any step.
-  static double flow_moles(const Gas &from, double pressure_difference, double resistance,
-                           double levelling_volume) {
-    const double rate = 1.0 / (resistance * levelling_volume) * from.pressure();
-    const double share = 1.0 - std::exp(-rate * kStep);
-    return share * pressure_difference * levelling_volume / (kGasConstant * from.temperature);
+  void leak(double h) {
+    const double conductance = par.leak_conductance + now.faults.leak_conductance;
+    if (conductance <= 0) return;
+    // stated at ambient conditions, at which gas takes up more room than inside
+    bleed(par, now.actuator, h, now.ledger, [&](double p, double) {
+      return (par.liquid ? 1 : p / par.ambient_pressure) / conductance;
+    });
   }
 
-  void exchange_gas(const rig_pins_out &out) {
-    const double series = now.syringe.volume * now.actuator.volume /
-                          (now.syringe.volume + now.actuator.volume);
-    const double relaxation = 1.0 - std::exp(-kStep / par.heat_exchange_time);
-    const bool joined =
-        !now.faults.tube_off && !now.faults.tube_blocked && now.fixture != PLANT_PLUGGED;
-    double out_of_syringe = 0, into_actuator = 0;
-    if (joined) {
-      out_of_syringe = into_actuator =
-          flow_moles(now.syringe, now.syringe.pressure() - now.actuator.pressure(),
-                     par.tube_resistance, series);
-    } else if (now.faults.tube_off) {
-      out_of_syringe = flow_moles(now.syringe, gauge(), par.tube_resistance, now.syringe.volume);
-      into_actuator = -flow_moles(now.actuator, actuator_gauge(), par.tube_resistance,
-                                  now.actuator.volume);
+  void settle() {
+    now.syringe.settle(par, shares.settle, now.ledger);
+    now.actuator.settle(par, shares.settle, now.ledger);
+  }
+
+  void move_plunger(double pulses, bool enabled, double h) {
+    const double pressure = gauge();
+    const double nut = now.drive.motor_volume;
+    now.drive.turn(par, enabled ? (1.0 - now.faults.lost_steps) * pulses : 0, pressure, h);
+    now.drive.follow(par, now.drive.motor_volume - nut, pressure, h);
+  }
+
+  // Tube and wall with the plunger where it is, but for what hangs on how fast it flows.
+  Coupling coupled(double ps, double pa) const {
+    const Felt pull = now.wall.pull(par, pa - par.ambient_pressure);
+    Coupling c{};
+    c.joined = joined();
+    c.syringe_stiffness = now.syringe.stiffness(par, ps);
+    c.actuator_stiffness = c.wall_stiffness = now.actuator.stiffness(par, pa);
+    c.inertia = par.shape_inertia;
+    c.lag = par.response_time;
+    c.pull = pull.value;
+    c.slope = pull.slope;
+    c.growth = actuator_volume(now.wall.shape).slope;
+    return c;
+  }
+
+  void deform_and_flow(double h) {
+    const double ps = now.syringe.pressure(par), pa = now.actuator.pressure(par);
+    Coupling c = coupled(ps, pa);
+    double mean = 0.5 * (ps + pa);
+    Motion motion{{now.tube_flow, now.wall.rate}, {}};
+    for (int i = 0; i < 2; ++i) {  // as things are in the beginning, then in the middle of the step
+      if (!par.liquid) {
+        c.syringe_stiffness = now.syringe.stiffness(par, mean);
+        c.actuator_stiffness = now.actuator.stiffness(par, mean);
+      }
+      const double flow = motion.mean.flow, rho = density(par, mean);
+      const Friction friction = tube_friction(par, flow, rho);
+      c.inertance = rho * par.tube_length_over_area;
+      c.resistance = friction.slope;
+      c.push = ps - pa + friction.slope * flow - friction.loss;
+      motion = step(c, {now.tube_flow, now.wall.rate}, h);
+      const double filled = c.actuator_stiffness - c.syringe_stiffness;
+      mean = 0.5 * (ps + pa) + 0.25 * h * (filled * motion.mean.flow -
+                                           c.wall_stiffness * c.growth * motion.mean.shape);
     }
-    if (out.valve_open) {
-      out_of_syringe += flow_moles(now.syringe, gauge(), par.valve_resistance, now.syringe.volume);
-    }
-    const double leak_volume_rate =
-        (par.leak_conductance + now.faults.leak_conductance) * actuator_gauge();
-    // a burst empties no further than to ambient
-    const double excess =
-        actuator_gauge() * now.actuator.volume / (kGasConstant * now.actuator.temperature);
-    const double wanted = leak_volume_rate * kStep * par.ambient_pressure /
-                          (kGasConstant * par.ambient_temperature);
-    const double leaked =
-        excess >= 0 ? std::min(wanted, 0.5 * excess) : std::max(wanted, 0.5 * excess);
-    now.syringe.change(now.syringe.moles - out_of_syringe, syringe_volume(),
-                       par.ambient_temperature, relaxation);
-    now.actuator.change(now.actuator.moles + into_actuator - leaked,
-                        actuator_volume(now.shape_pressure), par.ambient_temperature, relaxation);
+    now.tube_flow = motion.end.flow;
+    now.wall.rate = motion.end.shape;
+    now.wall.shape += 0.5 * h * motion.mean.shape;
+    now.actuator.compress(par, actuator_volume(now.wall.shape).value, now.ledger);
+    const bool forth = motion.mean.flow > 0;
+    Node &from = forth ? now.syringe : now.actuator, &to = forth ? now.actuator : now.syringe;
+    const double expanded = par.liquid ? 1 : mean / from.pressure(par);
+    to.add(from.draw(std::fabs(motion.mean.flow) * h * expanded / from.volume));
+    now.wall.shape += 0.5 * h * motion.mean.shape;
+    now.actuator.compress(par, actuator_volume(now.wall.shape).value, now.ledger);
   }
 
-  void deform() {
-    double played = 0;
-    for (int i = 0; i < PLANT_PLAYS; ++i) {
-      const double r = par.play_radius[i];
-      now.play[i] =
-          std::min(std::max(now.play[i], actuator_gauge() - r), actuator_gauge() + r);
-      played += now.play[i] / PLANT_PLAYS;
-    }
-    const double drive = (1 - par.play_share) * actuator_gauge() + par.play_share * played;
-    now.creep += (drive - now.creep) * (1.0 - std::exp(-kStep / par.creep_time));
-    const double crept = (1 - par.creep_share) * drive + par.creep_share * now.creep;
-    now.shape_pressure +=
-        (crept - now.shape_pressure) * (1.0 - std::exp(-kStep / par.response_time));
-  }
-
-  void read_transducer(rig_pins_in &in) {
-    now.drift += now.faults.drift_rate * kStep;
-    const double sign = now.faults.sensor_reversed ? -1.0 : 1.0;
-    const double felt = gauge() - bow_at(gauge(), par.transducer_bow, par.transducer_span) +
-                        now.transducer_zero.value + now.drift;
-    double volts = par.transducer_voltage_at_zero + sign * felt / par.transducer_gain;
-    if (now.faults.sensor_stuck) volts = now.held_voltage;
-    now.held_voltage = volts;
-    volts += now.faults.spike_voltage;
-    if (now.faults.sensor_open) volts = 0.02;
-    if (now.faults.sensor_short) volts = par.adc_reference;
-    in.adc_count = kConversionsPerStep;
-    for (int i = 0; i < kConversionsPerStep; ++i) {
-      const double noise = now.faults.sensor_stuck ? 0 : par.transducer_noise * now.random.normal();
-      const double level = (volts + noise) / par.adc_reference * par.adc_levels;
-      in.adc[i] = static_cast<uint16_t>(
-          std::min(std::max(std::floor(level), 0.0), par.adc_levels - 1));
-    }
-  }
-
-  void read_load_cell(rig_pins_in &in) {
-    const double load = force() + now.cell_load;
-    now.cell_creep += (load - now.cell_creep) * (1.0 - std::exp(-kStep / par.load_cell_creep_time));
-    in.hx711_ready = 0;
-    if (now.time < now.next_word_time) return;
-    now.next_word_time += par.load_cell_period;
-    if (now.faults.hx711_silent) return;
-    const double shown = load - bow_at(load, par.load_cell_bow, par.load_cell_span) +
-                         par.load_cell_creep_share * now.cell_creep + now.cell_zero.value;
-    const double sign = now.faults.load_cell_reversed ? -1.0 : 1.0;
-    const double counts = par.load_cell_zero_counts + sign * shown * par.counts_per_newton +
-                          par.load_cell_noise_counts * now.random.normal();
-    int32_t word = static_cast<int32_t>(std::lround(counts));
-    word = std::min(std::max(word, -0x800000), 0x7FFFFF);
-    uint32_t bits = static_cast<uint32_t>(word) & 0xFFFFFFu;
-    if (now.random.uniform() < std::max(par.bad_word_probability, now.faults.bad_words)) {
-      bits = (bits << 1 | 1u) & 0xFFFFFFu;  // one clock too many: the word arrives shifted
-    }
-    if (now.faults.hx711_stuck) bits = now.faults.hx711_word & 0xFFFFFFu;
-    in.hx711_word = bits;
-    in.hx711_ready = 1;
-  }
-
-  static uint8_t shown(bool pressed, int32_t fault) {
-    if (fault == PLANT_SWITCH_LIVE) return pressed;
-    return fault == PLANT_SWITCH_STUCK_CLOSED;
-  }
-
-  void keep_score(const rig_pins_out &out) {
+  void advance(double pulses, double h, const rig_pins_out &out) {
+    shares.prepare(par, h);
+    const double half = 0.5 * h;
+    flow_from_open_ends(half);
+    flow_through_valve(half, out.valve_open);
+    leak(half);
+    settle();
+    const double before = syringe_volume();
+    move_plunger(pulses, out.motor_enabled, h);
+    now.syringe.compress(par, 0.5 * (before + syringe_volume()), now.ledger);
+    now.wall.relax(shares);
+    deform_and_flow(h);
+    now.wall.remember(par, shares, actuator_gauge());
+    now.syringe.compress(par, syringe_volume(), now.ledger);
+    settle();
+    leak(half);
+    flow_through_valve(half, out.valve_open);
+    flow_from_open_ends(half);
+    now.time += h;
     now.peak_pressure = std::max({now.peak_pressure, gauge(), actuator_gauge()});
-    if (out.valve_open && !now.valve_open) now.valve_opened = now.time;
-    now.valve_open = out.valve_open != 0;
   }
 
-  void step(const rig_pins_out &out, rig_pins_in &in) {
-    now.time += kStep;
-    move_plunger(out);
-    exchange_gas(out);
-    deform();
-    keep_score(out);
-    wander();
-    read_transducer(in);
-    read_load_cell(in);
+  void tick(const rig_pins_out &out, rig_pins_in &in) {
+    if (out.valve_open && !now.valve_open) now.valve_opened = now.time + kTick;
+    now.valve_open = out.valve_open != 0;
+    for (int i = 0; i < par.substeps; ++i) {
+      advance(static_cast<double>(out.steps) / par.substeps, kTick / par.substeps, out);
+    }
+    now.sensors.wander(par, now.time);
+    now.sensors.read_transducer(par, now.faults, gauge(), in);
+    now.sensors.read_load_cell(par, now.faults, now.time, force(), in);
     const double half_step = 0.5 * par.volume_per_step;
-    in.home_switch = shown(now.pushed_volume <= half_step, now.faults.home_switch);
-    in.end_switch =
-        shown(now.pushed_volume >= par.syringe_volume - half_step, now.faults.end_switch);
+    in.home_switch =
+        Sensors::shown(now.drive.pushed_volume <= half_step, now.faults.home_switch);
+    in.end_switch = Sensors::shown(now.drive.pushed_volume >= par.syringe_volume - half_step,
+                                   now.faults.end_switch);
     in.emergency_stop = now.faults.emergency_stop != 0;
   }
 };
@@ -285,33 +217,52 @@ plant *plant_new(const plant_parameters *parameters, const plant_response *respo
 
 void plant_free(plant *p) { delete p; }
 
-void plant_do_step(void *p, const rig_pins_out *out, rig_pins_in *in) {
-  static_cast<plant *>(p)->step(*out, *in);
+void plant_tick(void *p, const rig_pins_out *out, rig_pins_in *in) {
+  static_cast<plant *>(p)->tick(*out, *in);
+}
+
+int plant_do_step(plant *p, double t, double h, double pulses, const rig_pins_out *out) {
+  if (!(std::fabs(t - p->now.time) < 1e-9) || !(h > 0) || h > kLongestStep) return 0;
+  p->advance(pulses, h, *out);
+  return 1;
 }
 
 void plant_run(plant *p, const rig_pins_out *out, rig_pins_in *in, size_t n) {
-  for (size_t i = 0; i < n; ++i) p->step(*out, *in);
+  for (size_t i = 0; i < n; ++i) p->tick(*out, *in);
 }
 
 void plant_set_fixture(plant *p, plant_fixture fixture) { p->now.fixture = fixture; }
 
-void plant_set_cell_load(plant *p, double force) { p->now.cell_load = force; }
+void plant_set_cell_load(plant *p, double force) { p->now.sensors.cell_load = force; }
 
 void plant_set_faults(plant *p, const plant_faults *faults) { p->now.faults = *faults; }
 
 void plant_get_truth(const plant *p, plant_truth *truth) {
-  truth->time = p->now.time;
+  const State &now = p->now;
+  truth->time = now.time;
   truth->gauge_pressure = p->gauge();
   truth->angle = p->angle();
   truth->force = p->force();
-  truth->actuator_volume = p->now.actuator.volume;
-  truth->pushed_volume = p->now.pushed_volume;
-  truth->gas_moles = p->now.syringe.moles + p->now.actuator.moles;
-  truth->temperature = p->now.syringe.temperature;
+  truth->actuator_volume = now.actuator.volume;
+  truth->pushed_volume = now.drive.pushed_volume;
+  truth->gas_moles =
+      now.syringe.air + now.actuator.air + now.syringe.dissolved + now.actuator.dissolved;
+  truth->temperature = now.syringe.temperature(p->par);
   truth->actuator_pressure = p->actuator_gauge();
-  truth->peak_pressure = p->now.peak_pressure;
-  truth->valve_opened = p->now.valve_opened;
-  truth->valve_open = p->now.valve_open;
+  truth->peak_pressure = now.peak_pressure;
+  truth->valve_opened = now.valve_opened;
+  truth->valve_open = now.valve_open;
+  truth->tube_flow = now.tube_flow;
+  truth->shape_pressure = now.wall.shape;
+  truth->load_cycles = now.wall.cycles(p->par);
+  truth->missed_pulses = now.drive.missed;
+  truth->dissolved_moles = now.syringe.dissolved + now.actuator.dissolved;
+  truth->liquid_volume = now.syringe.liquid + now.actuator.liquid;
+  truth->energy = now.syringe.energy + now.actuator.energy;
+  truth->work = now.ledger.work;
+  truth->heat = now.ledger.heat;
+  truth->enthalpy_out = now.ledger.enthalpy_out;
+  truth->moles_out = now.ledger.moles_out;
 }
 
 size_t plant_state_size(void) { return sizeof(State); }

@@ -1,8 +1,8 @@
-/* The virtual bench in C: pneumatics, plunger, actuator dynamics and sensors at a fixed 1 ms step.
+/* The virtual bench in C: fluid, plunger, actuator dynamics and sensors at a fixed step.
  *
  * Plain data in, plain data out: the state is one block of memory, so saving and restoring it is a
  * copy, and the same seed gives the same bytes. All quantities are SI; pressures are absolute
- * unless named gauge. `plant_do_step` has the signature that the firmware's host HAL calls.
+ * unless named gauge. `plant_tick` has the signature that the firmware's host HAL calls.
  */
 #ifndef RIG_PLANT_H
 #define RIG_PLANT_H
@@ -16,7 +16,7 @@
 extern "C" {
 #endif
 
-enum { PLANT_TABLE = 1024, PLANT_PLAYS = 3 };
+enum { PLANT_TABLE = 1024, PLANT_PLAYS = 3, PLANT_CREEPS = 4 };
 
 /* Quasi-static response over uniform gauge pressures from table_low to table_high. */
 typedef struct {
@@ -28,20 +28,45 @@ typedef struct {
 } plant_response;
 
 typedef struct {
+  int32_t substeps; /* of the physics in a millisecond */
   /* surroundings */
   double ambient_pressure, ambient_temperature;
   /* plunger: volume swept per step pulse, backlash as swept volume, travel, dead volume */
   double volume_per_step, backlash_volume, syringe_volume, dead_volume;
   double start_volume; /* where the plunger stands at power-on, pushed in from home */
-  /* gas */
-  double tube_volume, tube_resistance; /* Pa s/m3 */
-  double valve_resistance;             /* Pa s/m3 when open */
-  double leak_conductance;             /* m3/s (ambient conditions) per Pa gauge */
-  double heat_exchange_time;
-  /* actuator dynamics */
-  double response_time; /* first-order lag of shape behind pressure */
-  double creep_share, creep_time;
+  double plunger_area;
+  /* friction of the seal: N, N, N s/m. Without breakaway force the seal moves with the rod and
+   * stays where it is in the backlash, whatever the pressure. */
+  double breakaway_force, sliding_force, viscous_friction;
+  double rod_compliance; /* m/N, between nut and seal; needs friction */
+  /* stepper: pull-out torque at standstill (0: any torque), pulse rates in Hz at which it is down
+   * to 1/sqrt(2) and from which it can start, pulses in an electrical cycle, screw in m */
+  double holding_torque, corner_rate, start_rate, pulses_per_cycle, torque_per_force;
+  /* fluid: air of molar_mass, or a liquid with its density and air in it */
+  int32_t liquid;
+  double molar_mass, density, viscosity;
+  double bulk_modulus;     /* Pa, of the liquid without bubbles */
+  double entrained_air;    /* share of the volume that is bubbles at ambient pressure */
+  double solubility;       /* volume of gas that a volume of liquid dissolves, at any pressure */
+  double dissolution_time; /* of bubbles to solution and back */
+  double heat_exchange_time; /* gas to wall */
+  /* tube: its gas counts as the syringe's */
+  double tube_volume, tube_area, tube_diameter;
+  double tube_resistance; /* laminar, Pa s/m3 */
+  double minor_loss;      /* of the dynamic pressure */
+  double tube_length_over_area; /* 1/m; 0: what flows has no mass */
+  int32_t turbulence;
+  double valve_conductance;    /* sonic, m3/s (ISO 8778 conditions) per Pa */
+  double valve_critical_ratio;
+  double leak_conductance; /* m3/s (ambient conditions) per Pa gauge */
+  /* actuator */
+  double full_pressure; /* Pa; to there and back is one load cycle */
+  double response_time; /* s; lag of the shape behind the pressure by damping */
+  double shape_inertia; /* s2; 1 / (natural angular frequency)^2; 0: no mass */
+  double creep_share[PLANT_CREEPS], creep_time[PLANT_CREEPS];
   double play_share, play_radius[PLANT_PLAYS]; /* hysteresis: share and radii in Pa */
+  double mullins_share, mullins_width, mullins_cycles; /* d, beta, N0 in actuator.h */
+  double ageing; /* more shape per decade of load cycles */
   /* transducer and converter: volts = voltage_at_zero + (gauge - bow 4 x (1 - x)) / gain, with
    * x = gauge / span */
   double transducer_gain, transducer_voltage_at_zero, transducer_noise;
@@ -92,6 +117,14 @@ typedef struct {
   double actuator_pressure, peak_pressure;
   double valve_opened; /* when the closed valve was last opened */
   int32_t valve_open;
+  double tube_flow;      /* m3/s, to the actuator */
+  double shape_pressure; /* Pa; the quasi-static pressure of the shape */
+  double load_cycles;
+  double missed_pulses;
+  double dissolved_moles, liquid_volume; /* liquid as at ambient pressure */
+  /* J: internal energy of the air now; since power-on work done on it and heat taken up, and
+   * enthalpy and moles gone to ambient */
+  double energy, work, heat, enthalpy_out, moles_out;
 } plant_truth;
 
 typedef struct plant plant;
@@ -99,9 +132,13 @@ typedef struct plant plant;
 plant *plant_new(const plant_parameters *parameters, const plant_response *response,
                  uint64_t seed);
 void plant_free(plant *p);
-/* Advances the bench by 1 ms; a rig_bench_fn. */
-void plant_do_step(void *p, const rig_pins_out *out, rig_pins_in *in);
-/* The same with idle pins, n times; for physics tests and settling. */
+/* Advances the bench by 1 ms and reads its sensors; a rig_bench_fn. */
+void plant_tick(void *p, const rig_pins_out *out, rig_pins_in *in);
+/* Advances the physics alone from time t by h, at most 5 ms, during which `pulses` are made, evenly
+ * and not as whole ones; those of `out` do not count. Returns 0, and does nothing, if t is not the
+ * plant's time to 1 ns or h is out of range. */
+int plant_do_step(plant *p, double t, double h, double pulses, const rig_pins_out *out);
+/* n ticks; for physics tests and settling. */
 void plant_run(plant *p, const rig_pins_out *out, rig_pins_in *in, size_t n);
 void plant_set_fixture(plant *p, plant_fixture fixture);
 /* Force in N of masses that somebody places on the load cell. */
