@@ -30,7 +30,7 @@ def test_a_bench_is_identified_and_the_record_read_again(rig: Command, tmp_path:
 def test_bad_levels_and_runs_are_told_in_a_sentence(rig: Command, tmp_path: Path) -> None:
     high = rig("identify", *QUICK[:4], "--levels", "40", "--out", tmp_path / "run")
     assert high.code == 1
-    assert "Nothing was moved" in high.err
+    assert "Nothing was moved" in " ".join(high.err.split())
     none = rig("identify", tmp_path)
     assert none.code == 1
     assert "run.mcap" in none.err
