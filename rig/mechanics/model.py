@@ -65,6 +65,7 @@ _PREDICTORS: dict[tuple[str, str], Predictor] = {
     ("bellow-bending", "beam"): beam_of_bending_bellow,
     ("bellow-bending", "fe"): finite_elements,
     ("bellow-axisymmetric", "fe"): finite_elements,
+    ("bellow-gripper", "fe"): finite_elements,
     ("bellow-joint", "fe"): finite_elements,
 }
 

@@ -85,6 +85,12 @@ class J2Plasticity:
         return np.where(flow.yields, after, history.reshape(after.shape)).reshape(history.shape)
 
 
+def plastic_strain(history: Array) -> Array:
+    """Equivalent plastic strain, (...), of a history (10, ...)."""
+    strain: Array = history[9]
+    return strain
+
+
 @dataclass(frozen=True)
 class Flow:
     """What one step does at each point, all (n,)."""

@@ -168,8 +168,50 @@ class BellowJointGeometry(SpecModel):
         return self
 
 
+class BellowGripperGeometry(SpecModel):
+    """Gripper of Auysakul et al. (Actuators 12 (2023) 300), Section 6.2: two axisymmetric bellows
+    that face each other press a rigid object from both sides; in metres.
+
+    The paper states neither the distance of bellows and object nor any friction: both are ours.
+    """
+
+    family: Literal["bellow-gripper"]
+    finger: BellowAxisymmetricGeometry = Field(description="either bellow")
+    held: Literal["cube", "cylinder", "sphere"] = Field(
+        "cube", description="the object; a cylinder stands upright: it is pulled along its axis"
+    )
+    object_size: Length = Field(0.050, gt=0, description="side or diameter of the object")
+    clearance: Length = Field(
+        0.003, ge=0, description="from the top of either bellow at rest to the object"
+    )
+    friction: Ratio = Field(0.13, gt=0, description="Coulomb's coefficient, bellow on object")
+
+    @property
+    def wall_thickness(self) -> float:
+        """Of either finger in metres."""
+        return self.finger.wall_thickness
+
+    @property
+    def cavity_radius(self) -> float:
+        """Largest radius of a finger's cavity in metres."""
+        return self.finger.cavity_radius
+
+    @model_validator(mode="after")
+    def _holds_with_its_top(self) -> BellowGripperGeometry:
+        size, top = self.object_size * 1e3, self.finger.top_diameter * 1e3
+        require(
+            self.held != "cube" or self.object_size >= self.finger.top_diameter,
+            f"the cube is smaller than the top that presses it: object_size = {size:.3g} mm must "
+            f"be at least top_diameter = {top:.3g} mm; its edges are not modelled",
+        )
+        return self
+
+
 Geometry = Annotated[
-    BellowBendingGeometry | BellowAxisymmetricGeometry | BellowJointGeometry,
+    BellowBendingGeometry
+    | BellowAxisymmetricGeometry
+    | BellowJointGeometry
+    | BellowGripperGeometry,
     Field(discriminator="family"),
 ]
 

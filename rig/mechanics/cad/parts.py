@@ -21,6 +21,7 @@ from rig.mechanics.mesh.bellow_joint import JointBellow
 from rig.spec.actuator import (
     BellowAxisymmetricGeometry,
     BellowBendingGeometry,
+    BellowGripperGeometry,
     BellowJointGeometry,
     Geometry,
 )
@@ -37,6 +38,9 @@ def parts_of(geometry: Geometry) -> tuple[Part, ...]:
         case BellowAxisymmetricGeometry():
             body = axisymmetric_soft_body(AxisymmetricBellow.of(geometry))
             return (Part("soft", body, is_soft=True),)
+        case BellowGripperGeometry():
+            # its rigid frame is not described
+            return parts_of(geometry.finger)
         case BellowJointGeometry():
             return (Part("soft", joint_soft_body(JointBellow.of(geometry)), is_soft=True),)
 

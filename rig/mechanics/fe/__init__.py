@@ -11,7 +11,6 @@ from rig.mechanics.fe.control import (
     AngleControl,
     Control,
     DisplacementControl,
-    GasControl,
     PressureControl,
     VolumeControl,
 )
@@ -37,7 +36,6 @@ __all__ = [
     "Extremes",
     "Fields",
     "FiniteElementError",
-    "GasControl",
     "Kinematics",
     "MeshError",
     "Model",

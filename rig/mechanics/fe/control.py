@@ -94,28 +94,6 @@ class VolumeControl:
 
 
 @dataclass(frozen=True)
-class GasControl:
-    """The gas in the cavity as the work (p + ambient) V in J, which is n R T of its n moles.
-
-    A pump with a constant rate makes it grow or fall evenly in time, at constant temperature.
-    """
-
-    ambient: float
-    """Absolute pressure outside, where the cavity's is 0, in Pa."""
-    name: str = "amount of gas"
-    unit: str = "J"
-
-    def value(self, at: Situation, /) -> float:
-        """(p + ambient) V in J."""
-        return (at.state.pressure + self.ambient) * at.assembly.volume
-
-    def slope(self, at: Situation, /) -> Slope:
-        """Of the volume by the displacements, and the volume itself."""
-        by_x = (at.state.pressure + self.ambient) * at.assembly.volume_slope
-        return Slope(by_x, np.zeros(at.model.body_size), at.assembly.volume)
-
-
-@dataclass(frozen=True)
 class DisplacementControl:
     """A weighted sum of displacements in m: the degrees of freedom `dofs` times `weights`."""
 

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import spsolve
 
-from rig.mechanics.mesh.curved import CurvedQuad
-from rig.mechanics.mesh.lattice import Block, join, line, rectangle, transfinite
+from rig.mechanics.mesh.curved import CurvedHex, CurvedQuad
+from rig.mechanics.mesh.lattice import Block, join, line, rectangle, revolved, transfinite
 from rig.spec.actuator import BellowAxisymmetricGeometry
 
 Array = NDArray[np.float64]
@@ -133,14 +133,42 @@ def mesh_axisymmetric_bellow(
 ) -> AxisymmetricBellowMesh:
     """Mesh the meridian of an axisymmetric bellow; all nodes of the arcs lie on them."""
     n = resolution or AxisymmetricResolution()
+    mesh, named = join(_blocks(shape, n, 0.0))
+    r, z = mesh.doflocs
+    return AxisymmetricBellowMesh(
+        mesh=mesh.with_boundaries(named, boundaries_only=False),
+        top_centre=int(np.argmin(r - z)),
+        shape=shape,
+        resolution=n,
+    )
+
+
+def mesh_bellow_quarter(
+    shape: AxisymmetricBellow, resolution: AxisymmetricResolution, around: int, hole: float
+) -> CurvedHex:
+    """A quarter of the bellow, x >= 0 and y >= 0, as 27-node hexahedra, `around` of them round it.
+
+    The top has a hole of radius `hole` in m on the axis, where hexahedra would degenerate.
+    Boundaries as of the meridian, `axis` being the hole, and `y=0` and `x=0`.
+    """
+    blocks = [
+        revolved(block, around, low="y=0", high="x=0") for block in _blocks(shape, resolution, hole)
+    ]
+    mesh, named = join(blocks)
+    quarter: CurvedHex = mesh.with_boundaries(named, boundaries_only=False)
+    return quarter
+
+
+def _blocks(shape: AxisymmetricBellow, n: AxisymmetricResolution, hole: float) -> list[Block]:
+    """The meridian from radius `hole` on."""
     inner, outer = shape.radius - shape.wall, shape.radius
     under = shape.height - shape.wall
     half = _half_layer(shape, n)
     layer = [half, half.mirrored(shape.pitch / 2, axis=1)]
     collar = rectangle((inner, 0.0), (outer, shape.collar), (n.wall, n.collar))
     rim = rectangle((inner, under), (outer, shape.height), (n.wall, n.top))
-    disc = rectangle((0.0, under), (inner, shape.height), (n.top_radius, n.top))
-    blocks = [
+    disc = rectangle((hole, under), (inner, shape.height), (n.top_radius, n.top))
+    return [
         Block(collar, {"i-": "cavity", "i+": "outside", "j-": "clamped"}),
         *(
             block.shifted(shape.collar + k * shape.pitch, axis=1)
@@ -150,14 +178,6 @@ def mesh_axisymmetric_bellow(
         Block(rim, {"i+": "outside", "j+": "top"}),
         Block(disc, {"i-": "axis", "j-": "cavity", "j+": "top"}),
     ]
-    mesh, named = join(blocks)
-    r, z = mesh.doflocs
-    return AxisymmetricBellowMesh(
-        mesh=mesh.with_boundaries(named, boundaries_only=False),
-        top_centre=int(np.argmin(r - z)),
-        shape=shape,
-        resolution=n,
-    )
 
 
 def _half_layer(shape: AxisymmetricBellow, n: AxisymmetricResolution) -> Block:

@@ -118,11 +118,12 @@ class JointBellow:
 
 @dataclass(frozen=True)
 class JointResolution:
-    """Numbers of elements."""
+    """Numbers of elements. With the default ones stress at troughs and crests is within 2 % of that
+    on twice as fine a mesh, displacement within 0.1 %; docs/validation/guo2020.md."""
 
-    wall: int = 2
+    wall: int = 3
     """Through the wall."""
-    fifth: int = 2
+    fifth: int = 4
     """Along a fifth of half a bellow: from one latitude to the next."""
     end: int = 2
     """Through a disc."""

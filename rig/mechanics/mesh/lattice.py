@@ -49,6 +49,19 @@ class Block:
         return Block(nodes, self.names)
 
 
+def revolved(block: Block, elements: int, *, low: str, high: str) -> Block:
+    """A quarter turn about z of a plane block in (r, z), third index from y = 0 to x = 0.
+
+    `low` and `high` name its sides there; those of the plane block keep their names.
+    """
+    angle = np.linspace(0.0, np.pi / 2, 2 * elements + 1)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    cosine[-1] = 0.0
+    r, z = np.moveaxis(block.nodes[..., None, :], -1, 0)
+    nodes = np.stack(np.broadcast_arrays(r * cosine, r * sine, z), axis=-1)
+    return Block(nodes, {**block.names, "k-": low, "k+": high})
+
+
 def between(start: Array, end: Array, elements: int) -> Array:
     """Lattice points from one array of points straight to another, new axis before the last."""
     share = np.linspace(0.0, 1.0, 2 * elements + 1)[:, np.newaxis]

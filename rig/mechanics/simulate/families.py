@@ -12,6 +12,7 @@ from rig.mechanics.mesh.bellow_bending import BendingResolution
 from rig.mechanics.simulate.axisymmetric import axisymmetric_model
 from rig.mechanics.simulate.bending import FREE_OPTIONS, bending_model
 from rig.mechanics.simulate.blocked import BLOCKED_OPTIONS, blocked_bending_model
+from rig.mechanics.simulate.gripper import finger_model, grip_model
 from rig.mechanics.simulate.inflation import ActuatorModel
 from rig.mechanics.simulate.joint import joint_model
 from rig.spec.material import MaterialSpec
@@ -51,6 +52,7 @@ _COARSE_BENDING = BendingResolution(wall=1, crown=4)
 
 FAMILIES: dict[str, Family] = {
     "bellow-axisymmetric": Family(model=Meshing(axisymmetric_model)),
+    "bellow-gripper": Family(model=Meshing(finger_model, grip_model)),
     "bellow-joint": Family(model=Meshing(joint_model)),
     "bellow-bending": Family(
         model=Meshing(

@@ -2,8 +2,7 @@
 
 As in the paper (Guo et al., Biocybern. Biomed. Eng. 40 (2020) 1359): without weight or inertia. It
 leaves the body free under pressure; here the lower disc's outer face is clamped, which adds a fixed
-frame and, on a disc, no stress that reaches the bellows. Flanks that touch are told, not resisted;
-`rig.mechanics.simulate.folding` resists them in one of many bellows.
+frame and, on a disc, no stress that reaches the bellows. Flanks that touch are told, not resisted.
 """
 
 from __future__ import annotations

@@ -1,0 +1,146 @@
+"""`rig latitudes`: where a joint bellow is weak when it is inflated and compressed."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rig.cli.app import app
+
+if TYPE_CHECKING:
+    from rig.mechanics.simulate.latitudes import LatitudeRun
+    from rig.spec.actuator import ActuatorSpec, BellowJointGeometry
+
+CSV_COLUMNS = ("stroke", "drive", "face", "bellow", "latitude", "von_mises_kpa", "rate_kpa_per_s")
+
+
+class StrokeName(StrEnum):
+    """Which way the bellow goes."""
+
+    INFLATION = "inflation"
+    COMPRESSION = "compression"
+
+
+@app.command()
+def latitudes(
+    actuator: Annotated[
+        Path, typer.Option(help="actuator spec, as models/actuators/bellow-joint.yaml")
+    ],
+    stroke: Annotated[
+        list[StrokeName] | None, typer.Option(help="inflation or compression; default: both")
+    ] = None,
+    csv: Annotated[
+        Path | None,
+        typer.Option(help="write every point's greatest stress and rate to this file"),
+    ] = None,
+) -> None:
+    """Tell the stress at ten latitudes of a joint bellow, pumped and deformed at constant rates.
+
+    Mean over the bellows of the largest von Mises stress at points A (trough) over F (crest) to J,
+    on both faces of the wall, and how well the bellows agree (intraclass correlation).
+
+    Example: `rig latitudes --actuator models/actuators/bellow-joint.yaml --csv weak.csv`
+    """
+    from rich.console import Console
+
+    from rig.mechanics.simulate.latitudes import COMPRESSION, INFLATION, Drive, drive
+    from rig.spec.loading import load_actuator
+    from rig.spec.workspace import Workspace
+
+    spec = load_actuator(actuator)
+    material = Workspace.find(actuator).material(spec.material)
+    geometry = _joint(spec)
+    strokes = {StrokeName.INFLATION: INFLATION, StrokeName.COMPRESSION: COMPRESSION}
+    lines: list[tuple[str, ...]] = []
+    for name in dict.fromkeys(stroke or tuple(StrokeName)):
+        runs = {}
+        for how in Drive:
+            with Console(stderr=True).status(f"finite elements, {name}, {how}"):
+                runs[how.value] = drive(geometry, material, strokes[name], how)
+            lines += _rows(name, how, runs[how.value])
+        _show(f"{spec.name}, {material.name}: {name}, von Mises stress in MPa", runs)
+    if csv is not None:
+        _write(csv, lines)
+
+
+def _joint(spec: ActuatorSpec) -> BellowJointGeometry:
+    from rig.mechanics.errors import MechanicsError
+    from rig.spec.actuator import BellowJointGeometry
+
+    if isinstance(spec.geometry, BellowJointGeometry):
+        return spec.geometry
+    raise MechanicsError(
+        f"latitudes are those of the family 'bellow-joint'; '{spec.name}' is of the family "
+        f"'{spec.geometry.family}'. Ask `rig predict --view` for its stresses."
+    )
+
+
+def _show(title: str, runs: dict[str, LatitudeRun]) -> None:
+    import numpy as np
+    from rich.console import Console
+    from rich.table import Table
+
+    from rig.mechanics.simulate.latitudes import FACES, LETTERS
+    from rig.validate.agreement import intraclass_correlation
+
+    shown = Table(title=title)
+    shown.add_column("latitude")
+    columns = []
+    for how, run in runs.items():
+        for face, greatest in zip(FACES, run.greatest, strict=True):
+            shown.add_column(f"{how}\n{face}", justify="right")
+            agreement = intraclass_correlation(greatest.T).coefficient
+            columns.append([*(greatest.mean(axis=0) / 1e6), agreement])
+    *stresses, agreements = np.transpose(columns)
+    for letter, row in zip(LETTERS, stresses, strict=True):
+        shown.add_row(letter, *(f"{value:.2f}" for value in row))
+    shown.add_section()
+    shown.add_row("agreement of bellows, ICC", *(f"{value:.3f}" for value in agreements))
+    console = Console()
+    console.print(shown)
+    for how, run in runs.items():
+        console.print(f"{how.capitalize()}: {_end_of(run)}", soft_wrap=True)
+
+
+def _end_of(run: LatitudeRun) -> str:
+    told = (
+        f"{1e3 * run.elongation[-1]:+.1f} mm at {run.pressure[-1] / 1e3:.2f} kPa after "
+        f"{run.time[-1]:.2g} s; plastic strain up to {100 * run.plastic[-1]:.2g} %."
+    )
+    touching = run.gap <= 0
+    if touching.any():
+        first = 1e3 * float(run.elongation[touching.argmax()])
+        told += f" Warning: flanks touch from {first:+.1f} mm on, which the model does not resist."
+    return told
+
+
+def _rows(name: str, how: str, run: LatitudeRun) -> list[tuple[str, ...]]:
+    from rig.mechanics.simulate.latitudes import FACES, LETTERS
+
+    greatest, rate = run.greatest / 1e3, run.rate.max(axis=0) / 1e3
+    return [
+        (name, how, face, str(b + 1), letter, f"{greatest[f, b, k]:.6g}", f"{rate[f, b, k]:.6g}")
+        for f, face in enumerate(FACES)
+        for b in range(greatest.shape[1])
+        for k, letter in enumerate(LETTERS)
+    ]
+
+
+def _write(path: Path, lines: list[tuple[str, ...]]) -> None:
+    import csv
+
+    from rig.mechanics.errors import MechanicsError
+
+    try:
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(CSV_COLUMNS)
+            writer.writerows(lines)
+    except OSError as error:
+        raise MechanicsError(
+            f"the table cannot be written to {path}: {error.strerror}. Name a file in an "
+            "existing folder that you may write to."
+        ) from None

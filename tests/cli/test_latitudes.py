@@ -1,0 +1,42 @@
+"""`rig latitudes`: its table, its file, and whom it refuses."""
+
+from __future__ import annotations
+
+import csv
+
+import pytest
+
+from rig.spec.workspace import library_root
+
+ACTUATORS = library_root() / "models/actuators"
+
+
+@pytest.fixture
+def short(tmp_path):
+    """The library's joint bellow with two bellows."""
+    text = (ACTUATORS / "bellow-joint.yaml").read_text(encoding="utf-8")
+    path = tmp_path / "short.yaml"
+    path.write_text(text.replace("bellow_number: 14", "bellow_number: 2"), encoding="utf-8")
+    return path
+
+
+def test_it_tells_every_latitude_and_writes_every_point(rig, short, tmp_path, monkeypatch) -> None:
+    pytest.importorskip("pingouin", reason="pingouin is not installed")
+    from rig.mechanics.simulate import latitudes
+
+    monkeypatch.setattr(latitudes, "INFLATION", latitudes.Stroke(0.5e-3, 0.5))
+    file = tmp_path / "weak.csv"
+    found = rig("latitudes", "--actuator", short, "--stroke", "inflation", "--csv", file)
+    assert found.code == 0, found.err
+    assert "agreement of bellows, ICC" in found.out
+    assert "Pumped: +0.5 mm at" in found.out
+    rows = list(csv.DictReader(file.open(encoding="utf-8")))
+    assert len(rows) == 2 * 2 * 2 * 10
+    assert {row["latitude"] for row in rows} == set("ABCDEFGHIJ")
+    assert all(float(row["von_mises_kpa"]) > 0 for row in rows)
+
+
+def test_other_families_are_refused(rig) -> None:
+    found = rig("latitudes", "--actuator", ACTUATORS / "bellow-axisymmetric.yaml")
+    assert found.code == 1
+    assert "family 'bellow-joint'" in found.err
