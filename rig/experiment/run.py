@@ -36,6 +36,7 @@ from rig.record.documents import (
     StartDocument,
 )
 from rig.record.writer import RunWriter
+from rig.spec.physics import Liquid
 from rig.spec.protocol import BlockedForceProtocol, DeformationProtocol
 from rig.vision.measure import AngleMeter
 
@@ -136,8 +137,10 @@ def _recorded(context: RunContext, record: RunWriter, done: Collection[PointKey]
     )
 
 
-def _gas_watch(context: RunContext, record: RunWriter) -> GasWatch:
-    """Warns of leaks, in the log and to whoever watches."""
+def _gas_watch(context: RunContext, record: RunWriter) -> GasWatch | None:
+    """Warns of leaks, in the log and to whoever watches; none where there is no gas to follow."""
+    if isinstance(context.request.setup.bench.fluid, Liquid):
+        return None
 
     def warn(time_s: float, alarm: GasAlarm) -> None:
         text = describe_alarm(time_s, alarm)
@@ -155,7 +158,7 @@ def _experiments(
     context: RunContext,
     record: RunWriter,
     recorder: LinkRecorder,
-    watch: GasWatch,
+    watch: GasWatch | None,
     done: frozenset[PointKey],
 ) -> None:
     """Every sweep that still has points to take."""
@@ -176,7 +179,8 @@ def _experiments(
         if sweep.experiment != mounted:
             mounted = sweep.experiment
             _mount(context, mounted)
-            watch.renew()
+            if watch is not None:
+                watch.renew()
             observer.stage("conditioning the actuator")
             condition(link, context.request.plan.settings(mounted))
         _sweep(context, record, recorder, sweep, left)

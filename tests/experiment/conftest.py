@@ -44,8 +44,10 @@ SHORT: dict[str, Any] = {
 }
 
 
-def make_request(protocol: dict[str, object] = SHORT, seed: int = 1) -> RunRequest:
-    setup = Workspace(ROOT).setup(BEAM_ACTUATOR, "virtual-beam")
+def make_request(
+    protocol: dict[str, object] = SHORT, seed: int = 1, bench: str = "virtual-beam"
+) -> RunRequest:
+    setup = Workspace(ROOT).setup(BEAM_ACTUATOR, bench)
     # the files behind a run are its attachments: a replaced protocol must be there as well
     spec = ProtocolSpec.model_validate(protocol)
     source = replace(setup.sources["protocol"], spec=spec, text=_yaml(spec))

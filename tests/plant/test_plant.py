@@ -7,10 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
+from rig.mechanics.bellow import BellowShape
+from rig.plant.inertia import moment_of_inertia, shape_inertia
 from rig.plant.instruments import Instruments
+from rig.plant.parameters import drive_parameters
 from rig.plant.plant import Faults, Fixture, Plant, plant_parameters
 from rig.plant.specimen import draw_specimen
+from rig.spec.bench import BeamSpecimen, BenchSpec
+from rig.spec.physics import PlungerFriction
 from rig.spec.workspace import Workspace
 from tests.plant.idealised import (
     AMBIENT,
@@ -226,3 +232,93 @@ def test_zeros_drift_apart_by_as_much_as_stated() -> None:
         transducer.append(last[1] - first[1])
     assert np.std(cell) == pytest.approx(0.01, rel=0.2)
     assert np.std(transducer) == pytest.approx(1e3, rel=0.2)
+
+
+def test_what_a_bench_file_leaves_out_is_ideal() -> None:
+    setup = Workspace(Path(__file__).resolve().parents[2]).setup("bellow-bending", "virtual-harsh")
+    data = setup.bench.model_dump(mode="json")
+    del data["fluid"]
+    for section, names in {
+        "specimen": ("more_creep", "inertia", "mullins", "ageing"),
+        "pneumatics": ("turbulence", "minor_loss", "inertia"),
+        "drive": ("friction", "torque"),
+    }.items():
+        for name in names:
+            del data["virtual"][section][name]
+    rng = np.random.default_rng(1)
+    switches = {
+        "liquid": False,
+        "shape_inertia": 0.0,
+        "mullins_share": 0.0,
+        "ageing": 0.0,
+        "turbulence": False,
+        "minor_loss": 0.0,
+        "tube_length_over_area": 0.0,
+        "breakaway_force": 0.0,
+        "rod_compliance": 0.0,
+        "holding_torque": 0.0,
+    }
+    for bench in (setup.bench, BenchSpec.model_validate(data)):
+        assert bench.virtual is not None
+        specimen = draw_specimen(setup.actuator, setup.material, bench.virtual.specimen, rng)
+        hidden = Instruments.draw(bench, bench.virtual, rng)
+        found = plant_parameters(bench, specimen, hidden, 12e3)
+        ideal = {name: found[name] for name in switches} == switches
+        assert ideal == (bench is not setup.bench)
+        assert sum(share > 0 for share in found["creep_share"]) == (1 if ideal else 2)
+    for name in switches.keys() - {"liquid"}:
+        assert plant_parameters(setup.bench, specimen, hidden, 12e3)[name], name
+
+
+def test_the_motor_of_the_default_bench_has_torque_to_spare() -> None:
+    setup = Workspace(Path(__file__).resolve().parents[2]).setup("bellow-bending", "virtual-beam")
+    bench = setup.bench
+    assert bench.virtual is not None
+    hidden = Instruments.draw(bench, bench.virtual, np.random.default_rng(1))
+    found = drive_parameters(bench, bench.virtual.drive, hidden)
+    force = bench.safety.pressure * bench.syringe.area + found["sliding_force"]
+    rate = bench.controller.max_flow / bench.volume_per_step / found["corner_rate"]
+    assert found["torque_per_force"] * force < 0.1 * found["holding_torque"] / np.hypot(1, rate)
+
+
+def test_a_heavier_fluid_slows_the_bending() -> None:
+    setup = Workspace(Path(__file__).resolve().parents[2]).setup("bellow-bending", "virtual-beam")
+    assert setup.bench.virtual is not None
+    rng = np.random.default_rng(1)
+    specimen = draw_specimen(setup.actuator, setup.material, setup.bench.virtual.specimen, rng)
+    shape = BellowShape.of(specimen.geometry)
+    length, cavity = shape.effective_length, float(specimen.volume_free[40])
+    assert specimen.pressure[40] == 0.0
+
+    def energy(density: float) -> float:
+        """Kinetic, at a rate of the tip's angle of 1 rad/s, in slices; J."""
+        x = (np.arange(2_000) + 0.5) / 2_000 * length
+        slice_mass = (shape.soft_mass(specimen.density) + density * cavity) / 2_000
+        cap = shape.cap_mass(specimen.density)
+        spread = 0.5 * slice_mass * np.sum((x**2 / (2 * length)) ** 2)
+        return float(spread + 0.5 * cap * (length / 2) ** 2)
+
+    for density in (1.2, 998.0):
+        assert moment_of_inertia(specimen, density) == pytest.approx(2 * energy(density), rel=1e-5)
+    dry, wet = (shape_inertia(specimen, 12e3, density) for density in (1.2, 998.0))
+    assert 5 < 1 / (2 * np.pi * np.sqrt(wet)) < 1 / (2 * np.pi * np.sqrt(dry)) < 15
+
+
+def test_a_liquid_bench_has_no_feed_forward_of_a_gas() -> None:
+    bench = Workspace(Path(__file__).resolve().parents[2]).bench("virtual-water")
+    data = bench.model_dump(mode="json")
+    data["controller"]["feed_forward"] = 1.0
+    with pytest.raises(ValidationError, match="expected 0"):
+        BenchSpec.model_validate(data)
+
+
+def test_friction_and_creep_that_cannot_be_are_refused() -> None:
+    with pytest.raises(ValidationError, match="at least as large as sliding"):
+        PlungerFriction.model_validate({"breakaway": "3 N", "sliding": "4 N"})
+    variation = Workspace(Path(__file__).resolve().parents[2]).bench("virtual-beam").virtual
+    assert variation is not None
+    terms = [{"share": 0.5, "time": 1}, {"share": 0.46, "time": 10}]
+    with pytest.raises(ValidationError, match="together below 1"):
+        BeamSpecimen.model_validate(
+            variation.specimen.model_dump(mode="json") | {"more_creep": terms}
+        )

@@ -79,7 +79,7 @@ struct Wall {
 
   // How much less pressure the wall takes at the virgin pressure `w`.
   double softness(const plant_parameters &par, double w) const {
-    if (par.mullins_share <= 0 || w >= peak) return 0;
+    if (par.mullins_share <= 0 || peak <= 0 || w >= peak) return 0;
     return depth(par) * std::erf(left(par, w));
   }
 
@@ -115,7 +115,7 @@ struct Wall {
 
   // The virgin pressure w of p = w eta(w).
   Felt virgin(const plant_parameters &par, double p) const {
-    if (par.mullins_share <= 0 || p >= peak) return {p, 1};
+    if (par.mullins_share <= 0 || peak <= 0 || p >= peak) return {p, 1};
     const double d = depth(par);
     double w = p / (1 - softness(par, p)), slope = 1;
     for (int i = 0; i < 20; ++i) {

@@ -20,6 +20,11 @@ struct Drive {
   int32_t stalled;
   int32_t sliding;  // +1 in, -1 out
 
+  // Where the end of the rod is that the nut takes along; the limit switches see it.
+  double carriage(const plant_parameters &par) const {
+    return std::min(std::max(pushed_volume, motor_volume), motor_volume + par.backlash_volume);
+  }
+
   // `pulses` in a time of `h`; `gauge` pressure pushes the plunger out.
   void turn(const plant_parameters &par, double pulses, double gauge, double h) {
     if (pulses == 0) return;

@@ -23,7 +23,7 @@ constexpr double kLongestStep = 5e-3;
 
 double lookup(const double *table, double low, double high, double x, double *slope = nullptr) {
   const double position = (x - low) / (high - low) * (PLANT_TABLE - 1);
-  const double clamped = std::min(std::max(position, 0.0), PLANT_TABLE - 1.000001);
+  const double clamped = std::min(std::max(0.0, position), PLANT_TABLE - 1.000001);  // 0 for NaN
   const int index = static_cast<int>(clamped);
   const double weight = clamped - index, rise = table[index + 1] - table[index];
   if (slope) *slope = rise * (PLANT_TABLE - 1) / (high - low);
@@ -201,11 +201,10 @@ struct plant {
     now.sensors.wander(par, now.time);
     now.sensors.read_transducer(par, now.faults, gauge(), in);
     now.sensors.read_load_cell(par, now.faults, now.time, force(), in);
-    const double half_step = 0.5 * par.volume_per_step;
-    in.home_switch =
-        Sensors::shown(now.drive.pushed_volume <= half_step, now.faults.home_switch);
-    in.end_switch = Sensors::shown(now.drive.pushed_volume >= par.syringe_volume - half_step,
-                                   now.faults.end_switch);
+    const double half_step = 0.5 * par.volume_per_step, carriage = now.drive.carriage(par);
+    in.home_switch = Sensors::shown(carriage <= half_step, now.faults.home_switch);
+    in.end_switch =
+        Sensors::shown(carriage >= par.syringe_volume - half_step, now.faults.end_switch);
     in.emergency_stop = now.faults.emergency_stop != 0;
   }
 };
