@@ -24,6 +24,7 @@ from rig.experiment.bench import Bench, Observer
 from rig.experiment.doctor import Finding, look_at_bench, look_at_machine
 from rig.experiment.errors import ExperimentError
 from rig.experiment.plan import make_plan
+from rig.experiment.program import plan_trials
 from rig.experiment.recorded import RunOutcome
 from rig.experiment.run import new_run, resume_run
 from rig.experiment.setup import (
@@ -84,12 +85,32 @@ class Session:
                 ", ".join(f"{t:g}" for t in targets),
                 f"{plan.settings(sweeps[0].experiment).hold:g}",
             )
+        if plan.keys:
+            self.console.print(table)
+            self.console.print(
+                f"{len(plan.keys)} points, about {plan.duration_s / 60:.0f} min of bench time; "
+                f"highest pressure {max(k.target_kpa for k in plan.keys):g} kPa, limit of the "
+                f"actuator {setup.actuator.limits.pressure / 1e3:g} kPa."
+            )
+        if self.request.trials:
+            self._show_trials()
+
+    def _show_trials(self) -> None:
+        table = Table("trial", "kind", "parts", "drive", "highest", "about (min)", "note")
+        for plan in self.request.trials:
+            first = plan.programs[0]
+            top = max(float(p.values.max()) for p in plan.programs)
+            unit, scale = ("kPa", 1e-3) if first.drive == "pressure" else ("mL", 1e6)
+            table.add_row(
+                escape(plan.trial.name),
+                plan.trial.kind,
+                str(len(plan.programs)),
+                first.drive,
+                f"{top * scale:.4g} {unit}",
+                f"{plan.duration_s / 60:.1f}",
+                escape(" ".join(first.notes)),
+            )
         self.console.print(table)
-        self.console.print(
-            f"{len(plan.keys)} points, about {plan.duration_s / 60:.0f} min of bench time; highest "
-            f"pressure {max(k.target_kpa for k in plan.keys):g} kPa, limit of the actuator "
-            f"{setup.actuator.limits.pressure / 1e3:g} kPa."
-        )
 
     def run(self, out: Path | None) -> int:
         """Take the whole run; returns the exit code of the command."""
@@ -108,22 +129,28 @@ class Session:
         """Take what is left of the run in `folder`; returns the exit code of the command."""
         reader = RunReader(folder)
         points = reader.points()
+        parts = reader.parts()
         done = [point.key for point in points]
+        done_parts = [part.key for part in parts]
         stop = reader.stop()
         if stop is not None and stop.exit_status == "success":
             raise ExperimentError(
-                f"the run {folder} is complete: all {len(done)} points were measured. "
+                f"the run {folder} is complete: all that was planned was measured. "
                 f"`rig report {folder}` writes its report again."
             )
         bench = self._open(
             folder,
             segment=len(reader.resumes()) + 1,
-            start_s=points[-1].measured_to_s if points else 0.0,
+            start_s=max(
+                (*(p.measured_to_s for p in points), *(p.to_s for p in parts)), default=0.0
+            ),
         )
         return self._take(
             folder,
             bench,
-            lambda observer, check: resume_run(folder, bench, self.request, observer, done, check),
+            lambda observer, check: resume_run(
+                folder, bench, self.request, observer, done, check, done_parts
+            ),
         )
 
     def _open(
@@ -174,7 +201,7 @@ class Session:
             return 0
         how_on = (
             f"`rig resume {folder}` continues after the last complete point."
-            if RunReader(folder).points()
+            if RunReader(folder).points() or RunReader(folder).parts()
             else "No point was complete: mend the cause and start a new run."
         )
         self.console.print(
@@ -242,13 +269,13 @@ def _session(setup: Setup, seed: int, logs: Path, expired: bool) -> Session:
     if not expired:
         require_valid_calibrations(setup.calibrations, today)
     caution = expired_calibrations(setup.calibrations, today)
+    cavity = float(cavity_volume(bending_geometry(setup.actuator, "A characterisation"), 0.0))
     request = RunRequest(
         setup=setup,
         plan=make_plan(setup.protocol, setup.actuator, setup.bench),
         seed=seed,
-        cavity_volume=float(
-            cavity_volume(bending_geometry(setup.actuator, "A characterisation"), 0.0)
-        ),
+        cavity_volume=cavity,
+        trials=plan_trials(setup, cavity),
         created=None
         if setup.bench.simulated
         else datetime.now().astimezone().isoformat(timespec="seconds"),

@@ -28,6 +28,21 @@ def show_summary(console: Console, summary: RunSummary, folder: Path) -> None:
                 f"{result.bias.value:+.3g} {unit}",
                 f"{result.max_error.value:.3g} {unit} at {result.max_error.pressure_kpa:g} kPa",
             )
-    console.print(table)
+    if summary.experiments:
+        console.print(table)
+    if summary.trials:
+        console.print(_trials(summary))
     outcome = f"status: {summary.status}; report: {folder / 'report.html'}"
     console.print(escape(outcome), soft_wrap=True)
+
+
+def _trials(summary: RunSummary) -> Table:
+    table = Table("trial", "parts", "figure", "value")
+    for name, trial in summary.trials.items():
+        parts = f"{trial.measured} of {trial.planned}"
+        for figure in trial.figures:
+            u = "" if figure.u is None else f" ± {2 * figure.u:.2g}"
+            value = f"{figure.value:.4g}{u} {figure.unit}".rstrip()
+            table.add_row(escape(name), parts, escape(figure.name), value)
+            name, parts = "", ""
+    return table

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal, Protocol
 
 from rig.experiment.plan import Plan
+from rig.experiment.program import TrialPlan
 from rig.link.bus import FrameBus
-from rig.record.documents import PointDocument, PointKey
+from rig.record.documents import PartDocument, PointDocument, PointKey
 
 Fixture = Literal["free", "blocked", "plugged"]
 """Tip free, tip against the load cell, or a plug in the tube instead of the actuator."""
@@ -45,8 +47,8 @@ class Bench(Protocol):
 class Observer(Protocol):
     """Somebody who watches a run."""
 
-    def began(self, plan: Plan, done: int) -> None:
-        """The run begins; `done` points of the plan are there already."""
+    def began(self, plan: Plan, trials: Sequence[TrialPlan], done: int) -> None:
+        """The run begins; `done` points and parts are there already."""
         ...
 
     def stage(self, text: str) -> None:
@@ -65,11 +67,15 @@ class Observer(Protocol):
         """A point is safely on disk."""
         ...
 
+    def part_done(self, part: PartDocument) -> None:
+        """A part of a trial is safely on disk."""
+        ...
+
 
 class Nobody:
     """An observer that looks away."""
 
-    def began(self, plan: Plan, done: int) -> None:
+    def began(self, plan: Plan, trials: Sequence[TrialPlan], done: int) -> None:
         """Ignore."""
 
     def stage(self, text: str) -> None:
@@ -82,4 +88,7 @@ class Nobody:
         """Ignore."""
 
     def point_done(self, point: PointDocument) -> None:
+        """Ignore."""
+
+    def part_done(self, part: PartDocument) -> None:
         """Ignore."""

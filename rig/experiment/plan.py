@@ -70,7 +70,8 @@ def make_plan(protocol: ProtocolSpec, actuator: ActuatorSpec, bench: BenchSpec) 
     sweeps: list[Sweep] = []
     duration_s = 0.0
     for name, section in sections:
-        _check_limits(protocol.name, name, section, actuator, bench)
+        what = f"the experiment {name} of the protocol '{protocol.name}'"
+        check_pressure(what, section.pressures.stop, actuator, bench)
         sweeps += [_sweep(name, section, repeat) for repeat in range(1, section.repeats + 1)]
         duration_s += _duration_s(section, bench)
     return Plan(protocol, tuple(sweeps), duration_s)
@@ -89,26 +90,19 @@ def _sweep(experiment: ExperimentName, section: SweepProtocol, repeat: int) -> S
     return Sweep(experiment, repeat, tuple(keys))
 
 
-def _check_limits(
-    protocol: str,
-    experiment: str,
-    section: SweepProtocol,
-    actuator: ActuatorSpec,
-    bench: BenchSpec,
-) -> None:
-    highest = section.pressures.stop
+def check_pressure(what: str, highest: float, actuator: ActuatorSpec, bench: BenchSpec) -> None:
+    """Raise LimitError if `what` asks for more than actuator, bench or transducer allow, in Pa."""
     limits = [
         (f"limits.pressure of the actuator '{actuator.name}'", actuator.limits.pressure),
         (f"safety.pressure of the bench '{bench.name}'", bench.safety.pressure),
         (f"the range of the transducer {bench.transducer.model}", bench.transducer.pressure_high),
     ]
-    for what, limit in limits:
+    for of, limit in limits:
         if highest > limit:
             raise LimitError(
-                f"the protocol '{protocol}' asks for {highest / 1e3:g} kPa in {experiment}, above "
-                f"{limit / 1e3:g} kPa, {what}. Nothing was moved. Lower "
-                f"{experiment}.pressures.stop of the protocol, or raise the limit if you are sure "
-                "that it may be."
+                f"{what} asks for {highest / 1e3:g} kPa, above {limit / 1e3:g} kPa, {of}. Nothing "
+                "was moved. Lower the pressures of the protocol, or raise the limit if you are "
+                "sure that it may be."
             )
 
 

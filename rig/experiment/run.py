@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 from rig.control.gas_monitor import GasAlarm
 from rig.experiment.bench import Bench, Fixture, Observer
+from rig.experiment.context import RunContext
 from rig.experiment.gas_watch import GasWatch, describe_alarm, gas_monitor
 from rig.experiment.measure import AngleMeasurement, ForceMeasurement, Measurement
 from rig.experiment.plan import Sweep
@@ -17,20 +17,20 @@ from rig.experiment.prepare import (
     leave_home,
     make_ready,
     take_over,
-    tare,
     vent,
     vented_pressure_kpa,
     write_parameters,
 )
-from rig.experiment.recheck import recheck_camera
 from rig.experiment.recorded import RunOutcome, carry_out, explaining_disk_errors, versions
 from rig.experiment.recorder import LinkRecorder
 from rig.experiment.setup import RunRequest
 from rig.experiment.sweep import Arrival, approach, go_to, settle
+from rig.experiment.trials import run_trials
 from rig.link.client import RigLink
 from rig.link.schema import load_schema
 from rig.record.documents import (
     ExperimentName,
+    PartKey,
     PointKey,
     ResumeDocument,
     StartDocument,
@@ -38,19 +38,8 @@ from rig.record.documents import (
 from rig.record.writer import RunWriter
 from rig.spec.physics import Liquid
 from rig.spec.protocol import BlockedForceProtocol, DeformationProtocol
-from rig.vision.measure import AngleMeter
 
 FIXTURES: Mapping[ExperimentName, Fixture] = {"deformation": "free", "blocked_force": "blocked"}
-
-
-@dataclass(frozen=True)
-class RunContext:
-    """The parts that every step of a run uses."""
-
-    bench: Bench
-    link: RigLink
-    request: RunRequest
-    observer: Observer
 
 
 def new_run(
@@ -98,6 +87,7 @@ def resume_run(
     observer: Observer,
     done: Collection[PointKey],
     interrupted: Callable[[], None] | None = None,
+    done_parts: Collection[PartKey] = (),
 ) -> RunOutcome:
     """Do what is left of the plan and append it to the log in `folder`; see `new_run`."""
     # the log is locked before the bench hears anything: another process may be using both
@@ -110,12 +100,12 @@ def resume_run(
         _configure(link, request)
         note = ResumeDocument(
             resumed_s=link.now_s,
-            points_kept=len(done),
+            points_kept=len(done) + len(done_parts),
             seed=request.seed,
             versions=versions(identity),
         )
         record.resume_note(note, link.now_s)
-        return _recorded(RunContext(bench, link, request, observer), record, done)
+        return _recorded(RunContext(bench, link, request, observer), record, done, done_parts)
 
 
 def _configure(link: RigLink, request: RunRequest) -> dict[str, float]:
@@ -123,14 +113,21 @@ def _configure(link: RigLink, request: RunRequest) -> dict[str, float]:
     return write_parameters(link, request.board_parameters())
 
 
-def _recorded(context: RunContext, record: RunWriter, done: Collection[PointKey]) -> RunOutcome:
+def _recorded(
+    context: RunContext,
+    record: RunWriter,
+    done: Collection[PointKey],
+    done_parts: Collection[PartKey] = (),
+) -> RunOutcome:
     request = context.request
     watch = _gas_watch(context, record)
     return carry_out(
         context.link,
         record,
-        lambda recorder: _experiments(context, record, recorder, watch, frozenset(done)),
-        success="all points were measured",
+        lambda recorder: _experiments(
+            context, record, recorder, watch, frozenset(done), frozenset(done_parts)
+        ),
+        success="all that was planned was measured",
         cautions=request.cautions,
         stage=context.observer.stage,
         watch=watch,
@@ -160,43 +157,30 @@ def _experiments(
     recorder: LinkRecorder,
     watch: GasWatch | None,
     done: frozenset[PointKey],
+    done_parts: frozenset[PartKey],
 ) -> None:
-    """Every sweep that still has points to take."""
+    """Every sweep and trial that still has points or parts to take."""
     link, observer = context.link, context.observer
     sweeps = context.request.plan.sweeps
-    observer.began(context.request.plan, len(done))
+    observer.began(context.request.plan, context.request.trials, len(done) + len(done_parts))
     mounted: ExperimentName | None = None
     observer.stage("homing the plunger and zeroing the transducer")
     make_ready(link)
     if any(s.experiment == "deformation" and not done.issuperset(s.keys) for s in sweeps):
-        observer.stage("checking the calibration of the camera")
-        residual = recheck_camera(context.bench.camera, _meter(context))
-        record.event(link.now_s, "camera checked", {"ruler_residual_px": f"{residual:.4f}"})
+        context.check_camera(record)
     for sweep in sweeps:
         left = [key for key in sweep.keys if key not in done]
         if not left:
             continue
         if sweep.experiment != mounted:
             mounted = sweep.experiment
-            _mount(context, mounted)
+            context.mount(FIXTURES[mounted])
             if watch is not None:
                 watch.renew()
             observer.stage("conditioning the actuator")
             condition(link, context.request.plan.settings(mounted))
         _sweep(context, record, recorder, sweep, left)
-
-
-def _mount(context: RunContext, experiment: ExperimentName) -> None:
-    """Hold the tip as the experiment wants it.
-
-    The load cell is tared while nothing touches it: tared against the vented actuator it would
-    hide what the actuator's hysteresis leaves behind at zero pressure.
-    """
-    context.observer.stage(f"mounting the tip {FIXTURES[experiment]}")
-    context.bench.mount("free")
-    if FIXTURES[experiment] == "blocked":
-        tare(context.link)
-        context.bench.mount("blocked")
+    run_trials(context, record, recorder, watch, done_parts)
 
 
 def _sweep(
@@ -237,18 +221,13 @@ def _sweep(
     require_zero(vented_pressure_kpa(link), section.settling.tolerance / 1e3)
 
 
-def _meter(context: RunContext) -> AngleMeter:
-    calibrations = context.request.setup.calibrations
-    return AngleMeter(calibrations.camera, calibrations.ruler)
-
-
 def _measurement(context: RunContext, experiment: ExperimentName) -> Measurement:
     setup, section = context.request.setup, context.request.plan.settings(experiment)
     calibrations = setup.calibrations
     if isinstance(section, DeformationProtocol):
         return AngleMeasurement(
             camera=context.bench.camera,
-            meter=_meter(context),
+            meter=context.meter,
             calibration=calibrations.camera,
             frames=section.frames,
             frame_period_s=1 / setup.bench.camera.frame_rate,

@@ -9,6 +9,7 @@ from datetime import date
 from rig.experiment.errors import ExperimentError
 from rig.experiment.plan import Plan
 from rig.experiment.prepare import board_parameters, require_board_takes
+from rig.experiment.program import TrialPlan
 from rig.spec.workspace import BenchCalibrations, Setup
 
 
@@ -45,6 +46,8 @@ class RunRequest:
     """ISO date and time on a real bench; None in simulated time."""
     enclosures: Mapping[str, str] = field(default_factory=dict)
     """Texts to attach to the log besides the specs, by file name."""
+    trials: tuple[TrialPlan, ...] = ()
+    """Those of the protocol, planned; they follow the sweeps."""
     cautions: tuple[str, ...] = ()
     """What whoever reads the run must know of how it was begun; the log warns of it."""
 

@@ -37,6 +37,8 @@ CAMERA_KEY_TOPIC = "/camera/key"
 ANGLE_TOPIC = "/vision/angle"
 POINTS_TOPIC = "/points"
 GAS_TOPIC = "/gas"
+PARTS_TOPIC = "/parts"
+LOOKS_TOPIC = "/looks"
 LOG_TOPIC = "/log"
 TELEMETRY_PREFIX = "/rig/"
 

@@ -106,6 +106,44 @@ class AngleReading(Document):
     reason: str
 
 
+class PartKey(Document):
+    """Which part of which repeat of a trial; what a resumed run need not do again."""
+
+    trial: str
+    kind: str
+    repeat: int
+    part: int
+    """From 1; blocks of cycles are parts of their own."""
+
+
+class PartDocument(Document):
+    """A completed part of a trial; its readings are in the telemetry between its times."""
+
+    key: PartKey
+    from_s: float
+    to_s: float
+    plunger_from_ml: float
+    """Where the plunger stood when the part began; volumes of the trial count from there."""
+    looks: int
+    """Frames whose angle was accepted."""
+    rejected: tuple[str, ...]
+    """A reason for each of the others."""
+    notes: tuple[str, ...]
+    """What was not done as asked, sentences."""
+
+
+class LookDocument(Document):
+    """The angle in one camera frame of a trial."""
+
+    key: PartKey
+    time_s: float
+    """Since the part began."""
+    angle_deg: float | None
+    u_deg: float
+    accepted: bool
+    reason: str
+
+
 class GasDocument(Document):
     """What a Kalman filter made of plunger and pressure between a closing of the valve and the next
     opening; uncertainties are standard. `rig.control.gas` has the model."""

@@ -24,6 +24,8 @@ from rig.record.channels import (
     LEVELS,
     LOG_FILE,
     LOG_TOPIC,
+    LOOKS_TOPIC,
+    PARTS_TOPIC,
     POINTS_TOPIC,
     RESUME_METADATA,
     START_METADATA,
@@ -36,6 +38,8 @@ from rig.record.documents import (
     AngleReading,
     Document,
     GasDocument,
+    LookDocument,
+    PartDocument,
     PointDocument,
     PointKey,
     ResumeDocument,
@@ -158,6 +162,14 @@ class RunReader:
     def angle_readings(self) -> tuple[AngleReading, ...]:
         """Every vision result in the order of measurement."""
         return self._documents(ANGLE_TOPIC, AngleReading)
+
+    def parts(self) -> tuple[PartDocument, ...]:
+        """Every complete part of the trials in the order of measurement."""
+        return self._documents(PARTS_TOPIC, PartDocument)
+
+    def looks(self) -> tuple[LookDocument, ...]:
+        """The angles that were looked at in trials, in order."""
+        return self._documents(LOOKS_TOPIC, LookDocument)
 
     def gas(self) -> tuple[GasDocument, ...]:
         """What the gas did each time the valve was closed."""

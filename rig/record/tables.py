@@ -17,14 +17,18 @@ KEY_COLUMNS = ("experiment", "repeat", "direction", "target_kpa")
 
 
 def write_tables(reader: RunReader, folder: Path) -> tuple[Path, ...]:
-    """Write points.csv, angles.csv and pressure.csv into `folder`; returns their paths.
+    """Write points.csv, angles.csv, pressure.csv, and looks.csv if there were trials.
+
+    Returns their paths.
 
     Raises RecordError if the folder cannot be written.
     """
+    looks = ((folder / "looks.csv", LOOK_COLUMNS, _looks(reader)),) if reader.parts() else ()
     return (
         _write(folder / "points.csv", POINT_COLUMNS, _points(reader)),
         _write(folder / "angles.csv", ANGLE_COLUMNS, _angles(reader)),
         _write(folder / "pressure.csv", PRESSURE_COLUMNS, _pressure(reader)),
+        *(_write(*table) for table in looks),
     )
 
 
@@ -45,6 +49,10 @@ POINT_COLUMNS = (
     "rejected",
 )
 ANGLE_COLUMNS = (*KEY_COLUMNS, "frame", "angle_deg", "u_deg", "quality", "accepted", "reason")
+LOOK_COLUMNS = (
+    *("trial", "kind", "repeat", "part", "time_s", "pressure_kpa", "plunger_ml"),
+    *("angle_deg", "u_deg", "accepted", "reason"),
+)
 PRESSURE_COLUMNS = ("time_s", "pressure_mean_kpa", "pressure_min_kpa", "pressure_max_kpa")
 
 
@@ -66,6 +74,24 @@ def _angles(reader: RunReader) -> Iterable[Sequence[object]]:
             *(r.key.experiment, r.key.repeat, r.key.direction, r.key.target_kpa),
             *(r.frame, _number(r.angle_deg), _number(r.u_deg), _number(r.quality)),
             *(r.accepted, r.reason),
+        )
+
+
+def _looks(reader: RunReader) -> Iterable[Sequence[object]]:
+    """Angles of trials with pressure and plunger (from where the part began) at that time."""
+    pressure = reader.telemetry("PRESSURE")
+    parts = {part.key: part for part in reader.parts()}
+    for look in reader.looks():
+        part = parts.get(look.key)
+        if part is None:  # of a part that was not completed
+            continue
+        now_s = part.from_s + look.time_s
+        kpa = float(np.interp(now_s, pressure["time_s"], pressure["pressure_kpa"]))
+        ml = float(np.interp(now_s, pressure["time_s"], pressure["plunger_ml"]))
+        yield (
+            *(look.key.trial, look.key.kind, look.key.repeat, look.key.part, _time(look.time_s)),
+            *(_number(kpa), _number(ml - part.plunger_from_ml)),
+            *(_number(look.angle_deg), _number(look.u_deg), look.accepted, look.reason),
         )
 
 

@@ -30,6 +30,8 @@ from rig.record.channels import (
     LEVELS,
     LOG_FILE,
     LOG_TOPIC,
+    LOOKS_TOPIC,
+    PARTS_TOPIC,
     POINTS_TOPIC,
     RESUME_METADATA,
     START_METADATA,
@@ -46,6 +48,8 @@ from rig.record.documents import (
     AngleReading,
     Document,
     GasDocument,
+    LookDocument,
+    PartDocument,
     PointDocument,
     PointKey,
     ResumeDocument,
@@ -281,6 +285,16 @@ class RunWriter:
         self._document(POINTS_TOPIC, document, time_s)
         self._log.sync()
 
+    def look(self, document: LookDocument, time_s: float) -> None:
+        """The angle in one frame of a trial."""
+        self._document(LOOKS_TOPIC, document, time_s)
+
+    def part(self, document: PartDocument, time_s: float) -> None:
+        """A completed part of a trial; when this returns it is on disk, as a point is."""
+        self._log.flush()
+        self._document(PARTS_TOPIC, document, time_s)
+        self._log.sync()
+
     def gas(self, document: GasDocument, time_s: float) -> None:
         """What the gas did while the valve was closed."""
         self._document(GAS_TOPIC, document, time_s)
@@ -336,13 +350,13 @@ def require_free_folder(folder: Path) -> None:
 
 def _cut(path: Path, found: Scan, keep_points: int | None) -> tuple[int, int]:
     """Number of chunks to keep and the offset where they end."""
-    channel = found.channel_id(POINTS_TOPIC)
+    durable = [found.channel_id(topic) for topic in (POINTS_TOPIC, PARTS_TOPIC)]
     points = 0
     keep_chunks = 0
     for number, entry in enumerate(found.chunks, start=1):
         if keep_points is not None and points >= keep_points:
             break
-        count = entry.counts.get(channel, 0) if channel is not None else 0
+        count = sum(entry.counts.get(channel, 0) for channel in durable if channel is not None)
         if count:
             points += count
             keep_chunks = number

@@ -112,7 +112,13 @@ def summarise(
         seed=start.seed,
         created=start.created,
         versions=dict(sorted(start.versions.items())),
-        duration_s=max((point.measured_to_s for point in data.points), default=0.0),
+        duration_s=max(
+            (
+                *(point.measured_to_s for point in data.points),
+                *(part.to_s for part in reader.parts()),
+            ),
+            default=0.0,
+        ),
         resumed=tuple(ResumeSummary.model_validate(note.model_dump()) for note in reader.resumes()),
         notes=tuple(notes),
         experiments=experiments,

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rig.experiment.program import TrialPlan
 from rig.mechanics.errors import MechanicsError
 from rig.mechanics.job import Job
 from rig.mechanics.model import predict
@@ -21,6 +22,7 @@ from rig.report.errors import ReportError
 from rig.report.page import render_report
 from rig.report.strength import StrengthSection, strength_section
 from rig.report.summary import RunSummary
+from rig.report.trials import PartData, summarise_trials, trial_data, trial_sections
 from rig.spec.published import PublishedReference
 from rig.spec.workspace import Workspace, library_root
 
@@ -39,6 +41,7 @@ class Analysis:
     data: RunData
     predictions: dict[str, Response]
     summary: RunSummary
+    trials: list[tuple[TrialPlan, list[PartData]]]
 
 
 def analyse(reader: RunReader, job: Job | None = None) -> Analysis:
@@ -49,7 +52,10 @@ def analyse(reader: RunReader, job: Job | None = None) -> Analysis:
     data = load_run(reader)
     predictions, notes = _predictions(data, job or Job())
     notes += [str(e.data["what"]) for e in reader.events() if e.name in GAS_ALARMS]
-    return Analysis(data, predictions, summarise(data, predictions, _published(), notes))
+    summary = summarise(data, predictions, _published(), notes)
+    trials = trial_data(data)
+    summary = summary.model_copy(update={"trials": summarise_trials(trials)})
+    return Analysis(data, predictions, summary, trials)
 
 
 def build_report(
@@ -67,7 +73,13 @@ def build_report(
     job = replace(job, store=Remembering(job.store))
     analysis = analyse(reader, job)
     strength = _strength(analysis, job)
-    page = render_report(analysis.data, analysis.summary, analysis.predictions, strength)
+    page = render_report(
+        analysis.data,
+        analysis.summary,
+        analysis.predictions,
+        strength,
+        trial_sections(analysis.trials, analysis.summary.trials),
+    )
     try:
         folder.mkdir(parents=True, exist_ok=True)
         write_tables(reader, folder)
@@ -91,6 +103,8 @@ def write_text(path: Path, text: str) -> None:
 def _predictions(data: RunData, job: Job) -> tuple[dict[str, Response], list[str]]:
     """The models' responses over the pressures of the run, and why some are missing."""
     actuator, material = data.setup.actuator, data.setup.material
+    if data.setup.protocol.deformation is None and data.setup.protocol.blocked_force is None:
+        return {}, []
     top = _top(data)
     targets = [1e3 * point.key.target_kpa for point in data.points]
     # a model that ends between two points of a curve still answers at the pressure it ended at

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 
@@ -21,6 +21,7 @@ from rig.report.figures import (
     trace_figure,
 )
 from rig.report.pictures import overlay_pictures
+from rig.report.sheet_parts import Section as TrialSection
 from rig.report.strength import StrengthSection
 from rig.report.summary import (
     ControllerSummary,
@@ -127,6 +128,7 @@ def render_report(
     summary: RunSummary,
     predictions: Mapping[str, Response],
     strength: StrengthSection | None = None,
+    trials: Sequence[TrialSection] = (),
 ) -> str:
     """HTML text of the report; the same run gives the same bytes."""
     sections = [
@@ -143,6 +145,8 @@ def render_report(
         for name, experiment in summary.experiments.items()
     ]
     first = sections[0].summary if sections else None
+    done = [(e.measured, e.planned) for e in summary.experiments.values()]
+    done += [(t.measured, t.planned) for t in summary.trials.values()]
     template = environment().get_template("report.html.j2")
     return template.render(
         summary=summary,
@@ -154,8 +158,9 @@ def render_report(
         ],
         citations=_citations(summary),
         sections=sections,
-        measured=sum(e.measured for e in summary.experiments.values()),
-        planned=sum(e.planned for e in summary.experiments.values()),
+        measured=sum(measured for measured, _ in done),
+        planned=sum(planned for _, planned in done),
+        trials=trials,
         trace=trace_figure(data) if data.trace.time_s.size else None,
         step=step_figure(data, first),
         strength=strength,
@@ -198,6 +203,10 @@ def headline(summary: RunSummary) -> tuple[str, ...]:
     for model, misses in errors.items():
         theory = model_name(model)
         sentences.append(f"{theory[0].upper()}{theory[1:]} misses {'; '.join(misses)}.")
+    sentences += [
+        f"The trial {name}: {trial.measured} of {trial.planned} parts done."
+        for name, trial in summary.trials.items()
+    ]
     return tuple(sentences) or ("No point was measured.",)
 
 

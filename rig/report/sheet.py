@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from rig.report.build import write_text
-from rig.report.charts import Chart
 from rig.report.errors import ReportError
 from rig.report.page import environment
-
-Column = tuple[str, str]
-"""Name and unit; the unit may be empty."""
-Figure = tuple[Chart, str]
-"""A chart and its caption."""
+from rig.report.sheet_parts import Section
 
 
 @dataclass(frozen=True)
@@ -27,25 +21,6 @@ class Sheet:
     headline: tuple[str, ...]
     sections: tuple[Section, ...]
     banners: tuple[Banner, ...] = ()
-
-
-@dataclass(frozen=True)
-class Section:
-    """A part of the page."""
-
-    title: str
-    text: tuple[str, ...] = ()
-    tables: tuple[Table, ...] = ()
-    figures: tuple[Figure, ...] = ()
-
-
-@dataclass(frozen=True)
-class Table:
-    """Cells as text; the first of a row is its head."""
-
-    columns: Sequence[Column]
-    rows: Sequence[Sequence[str]]
-    caption: str = ""
 
 
 @dataclass(frozen=True)

@@ -233,6 +233,28 @@ class ResumeSummary(SummaryModel):
     versions: dict[str, str]
 
 
+class TrialFigure(SummaryModel):
+    """One figure of a trial."""
+
+    name: str
+    value: Number
+    u: Number | None
+    """Standard uncertainty; None where none was found."""
+    unit: str
+
+
+class TrialSummary(SummaryModel):
+    """One trial: creep, cycles, a drive, a pull or a trajectory."""
+
+    kind: str
+    planned: int
+    measured: int
+    """Parts."""
+    figures: tuple[TrialFigure, ...]
+    notes: tuple[str, ...]
+    """What was not done as asked."""
+
+
 class RunSummary(SummaryModel):
     """Everything a run found out."""
 
@@ -257,6 +279,8 @@ class RunSummary(SummaryModel):
     notes: tuple[str, ...]
     """What could not be computed, and why."""
     experiments: dict[ExperimentName, ExperimentSummary]
+    trials: dict[str, TrialSummary] = {}
+    """By name."""
 
     def to_json(self) -> str:
         """Text of `summary.json`; the same run gives the same bytes."""

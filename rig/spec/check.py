@@ -11,7 +11,8 @@ from rig.spec.bench import BenchSpec
 from rig.spec.errors import Problem, SpecError
 from rig.spec.loading import Loaded, parse_any, read_text
 from rig.spec.material import MaterialSpec
-from rig.spec.workspace import SUFFIXES, Workspace
+from rig.spec.protocol import ProtocolSpec
+from rig.spec.workspace import SUFFIXES, Workspace, with_curves
 
 
 @dataclass(frozen=True)
@@ -63,6 +64,8 @@ def check_file(path: Path) -> FileReport:
             material = workspace.resolve_actuator(source)
         elif isinstance(source.spec, BenchSpec):
             workspace.resolve_bench_file(source)
+        elif isinstance(source.spec, ProtocolSpec):
+            with_curves(source)
         elif isinstance(source.spec, MaterialSpec):
             material = source
     except SpecError as error:

@@ -8,9 +8,9 @@ from pydantic import Field, model_validator
 
 from rig.spec.base import Count, Integer, Name, SpecModel, require
 from rig.spec.quantity import Duration, Pressure
+from rig.spec.trial import DAY_S, Trial
 
 MAX_STEPS = 1000
-DAY_S = 86_400.0
 
 
 class PressureSteps(SpecModel):
@@ -102,11 +102,14 @@ class ProtocolSpec(SpecModel):
     description: str = ""
     deformation: DeformationProtocol | None = None
     blocked_force: BlockedForceProtocol | None = None
+    trials: tuple[Trial, ...] = Field((), max_length=100)
 
     @model_validator(mode="after")
     def _at_least_one_experiment(self) -> ProtocolSpec:
         require(
-            self.deformation is not None or self.blocked_force is not None,
-            "no experiment to run; expected 'deformation', 'blocked_force' or both",
+            self.deformation is not None or self.blocked_force is not None or bool(self.trials),
+            "no experiment to run; expected 'deformation', 'blocked_force' or 'trials'",
         )
+        names = [trial.name for trial in self.trials]
+        require(len(set(names)) == len(names), "two trials have the same name")
         return self

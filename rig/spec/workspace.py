@@ -23,6 +23,7 @@ from rig.spec.calibration import (
     TransducerCalibration,
 )
 from rig.spec.consistency import pressure_beyond_material
+from rig.spec.curve import read_curve
 from rig.spec.errors import Problem, SpecError
 from rig.spec.explain import did_you_mean, show
 from rig.spec.faults import FaultScript
@@ -290,7 +291,8 @@ class Workspace:
             sources["bench"] = equipment
             sources |= self.resolve_bench_file(equipment)
         with problems.collected():
-            sources["protocol"] = read(self.path("protocol", protocol), ProtocolSpec)
+            steps = read(self.path("protocol", protocol), ProtocolSpec)
+            sources["protocol"] = with_curves(steps)
         problems.raise_any()
         return _assemble(sources)
 
@@ -306,6 +308,29 @@ class Workspace:
             message = f"{why.path}: {why.message}"
             raise SpecError([problem_at(source, location, message)]) from None
         return read(path, model)
+
+
+def with_curves(source: Loaded[ProtocolSpec]) -> Loaded[ProtocolSpec]:
+    """The protocol with its CSV files read into it: a run's attachment must not need them.
+
+    Raises SpecError for a file that is missing or wrong.
+    """
+    trials, problems = [], _Problems()
+    for trial in source.spec.trials:
+        read_in = {}
+        for name, curve in getattr(trial, "curves", {}).items():
+            if curve.file is not None:
+                with problems.collected():
+                    read_in[name] = read_curve(source.path.parent / curve.file)
+        trials.append(trial.model_copy(update=read_in))
+    problems.raise_any()
+    if trials == list(source.spec.trials):
+        return source
+    spec = source.spec.model_copy(update={"trials": tuple(trials)})
+    # JSON is YAML, too; validated again, as curves of files meet here for the first time
+    return parse(
+        spec.model_dump_json(exclude_none=True, indent=1) + "\n", source.path, ProtocolSpec
+    )
 
 
 def _value_at(spec: Any, location: Location) -> Any:

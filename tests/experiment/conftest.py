@@ -13,6 +13,7 @@ from rig.board.truth import TruthSample, read_truth
 from rig.board.virtual import VirtualBench
 from rig.experiment.bench import Nobody, Observer
 from rig.experiment.plan import make_plan
+from rig.experiment.program import plan_trials
 from rig.experiment.recorded import RunOutcome
 from rig.experiment.run import new_run, resume_run
 from rig.experiment.setup import RunRequest
@@ -50,30 +51,18 @@ def make_request(
     setup = Workspace(ROOT).setup(BEAM_ACTUATOR, bench)
     # the files behind a run are its attachments: a replaced protocol must be there as well
     spec = ProtocolSpec.model_validate(protocol)
-    source = replace(setup.sources["protocol"], spec=spec, text=_yaml(spec))
+    source = replace(
+        setup.sources["protocol"], spec=spec, text=spec.model_dump_json(exclude_none=True)
+    )
     setup = replace(setup, protocol=spec, sources={**setup.sources, "protocol": source})
+    cavity = float(cavity_volume(setup.actuator.geometry, 0.0))
     return RunRequest(
         setup=setup,
         plan=make_plan(spec, setup.actuator, setup.bench),
         seed=seed,
-        cavity_volume=float(cavity_volume(setup.actuator.geometry, 0.0)),
+        cavity_volume=cavity,
+        trials=plan_trials(setup, cavity),
     )
-
-
-def _yaml(spec: ProtocolSpec) -> str:
-    from io import StringIO
-
-    from ruamel.yaml import YAML
-
-    data = spec.model_dump(exclude_none=True)
-    for section in ("deformation", "blocked_force"):
-        if section in data:
-            for name in ("start", "stop", "step"):
-                data[section]["pressures"][name] /= 1e3  # bare numbers are kPa
-            data[section]["settling"]["tolerance"] /= 1e3
-    stream = StringIO()
-    YAML().dump(data, stream)
-    return stream.getvalue()
 
 
 @dataclass(frozen=True)
@@ -109,16 +98,18 @@ def take(
 
 
 def take_rest(folder: Path, request: RunRequest) -> VirtualRun:
-    points = RunReader(folder).points()
+    points, parts = RunReader(folder).points(), RunReader(folder).parts()
+    ends = [*(p.measured_to_s for p in points), *(p.to_s for p in parts)]
     bench = VirtualBench(
         request.setup,
         request.seed,
         folder / "truth-2.mcap",
         segment=1,
-        start_s=points[-1].measured_to_s if points else 0.0,
+        start_s=max(ends, default=0.0),
     )
     try:
-        outcome = resume_run(folder, bench, request, Nobody(), [p.key for p in points])
+        done, done_parts = [p.key for p in points], [p.key for p in parts]
+        outcome = resume_run(folder, bench, request, Nobody(), done, done_parts=done_parts)
     finally:
         bench.close()
     return VirtualRun(folder, outcome)
