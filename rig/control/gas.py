@@ -55,9 +55,9 @@ class GasLine:
     """s; one Prony term stands for the creep of the first minute."""
     pressure_noise: float = 2.0
     """Pa; standard deviation of one sample as the filter gets it."""
-    volume_walk: float = 1e-9
+    volume_walk: float = 3e-9
     """m3/s^0.5 by which the volume wanders: slower creep than that of `creep_time`."""
-    stroke_error: float = 20e-9
+    stroke_error: float = 50e-9
     """m3 by which the volume may be off after a stroke of 1 mL, growing with its square root:
     the actuator's volume is not quite linear in the pressure."""
     heat_error: float = 0.3

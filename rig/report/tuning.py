@@ -22,7 +22,8 @@ from rig.report.charts import (
     stacked,
     styled,
 )
-from rig.report.sheet import Banner, Section, Sheet, Table, write_sheet
+from rig.report.sheet import Banner, Sheet, write_sheet
+from rig.report.sheet_parts import Section, Table
 
 Array = NDArray[np.float64]
 PAGE_FILE = "tuning.html"
