@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -32,6 +33,7 @@ def simulated(
     leak: Callable[[float], float],
     samples: int = 400,
     actuator: ActuatorVolume = ACTUATOR,
+    line: GasLine = LINE,
 ) -> tuple[list[tuple[float, float]], float, float]:
     """A line drawn from the filter's own prior and noises: samples, gas and actuator's volume.
 
@@ -41,8 +43,8 @@ def simulated(
     v = actuator.volume + actuator.u_volume * rng.normal()
     c = actuator.compliance + actuator.u_compliance * rng.normal()
     m = actuator.creep + actuator.u_creep * rng.normal()
-    gas, w, p = LINE.line_volume + v, 0.0, 0.0
-    readings = [(0.0, LINE.pressure_noise * rng.normal())]
+    gas, w, p = line.line_volume + v, 0.0, 0.0
+    readings = [(0.0, line.pressure_noise * rng.normal())]
     fine = 20
     for k in range(1, samples + 1):
         # slow enough that heat, which has a test of its own, does not matter
@@ -51,14 +53,14 @@ def simulated(
             plunger = 11e-6 * min(t / 40, 1.0)
             h = DT / fine
             gas -= leak(t) * p * h
-            w += (m * p - w) * h / LINE.creep_time
-            space = LINE.line_volume - plunger + v + w
+            w += (m * p - w) * h / line.creep_time
+            space = line.line_volume - plunger + v + w
             b = space + c * AMBIENT
             p = (-b + math.sqrt(b * b + 4 * c * AMBIENT * (gas - space))) / (2 * c)
         stroke = plunger - readings[-1][0]
-        walk = LINE.volume_walk**2 * DT + LINE.stroke_error**2 * stroke / 1e-6
+        walk = line.volume_walk**2 * DT + line.stroke_error**2 * stroke / 1e-6
         v += math.sqrt(walk) * rng.normal()
-        readings.append((plunger, p + LINE.pressure_noise * rng.normal()))
+        readings.append((plunger, p + line.pressure_noise * rng.normal()))
     return readings, gas, v + c * p + w
 
 
@@ -130,10 +132,11 @@ def test_the_signature_is_what_a_leak_does_to_the_innovations() -> None:
     signature is linear."""
     step = 1e-15
     known = ActuatorVolume(13e-6, 1e-8, 0.3e-9, 1e-12, 0.01e-9, 1e-12)
-    readings, _, _ = simulated(1, lambda _: 0.0, actuator=known)
+    quiet = replace(LINE, heat_time=1e-12, volume_walk=1e-10, stroke_error=1e-10)
+    readings, _, _ = simulated(1, lambda _: 0.0, actuator=known, line=quiet)
 
     def innovations(held: float) -> list[Innovation]:
-        kalman = GasFilter(GasLine(AMBIENT, LINE.line_volume, heat_time=1e-12), known, held)
+        kalman = GasFilter(quiet, known, held)
         kalman.close(*readings[0])
         return [kalman.step(DT, *reading) for reading in readings[1:]]
 
