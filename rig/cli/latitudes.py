@@ -13,8 +13,11 @@ from rig.cli.app import app
 if TYPE_CHECKING:
     from rig.mechanics.simulate.latitudes import LatitudeRun
     from rig.spec.actuator import ActuatorSpec, BellowJointGeometry
+    from rig.spec.material import MaterialSpec
 
 CSV_COLUMNS = ("stroke", "drive", "face", "bellow", "latitude", "von_mises_kpa", "rate_kpa_per_s")
+
+FOLD_STEPS = 12
 
 
 class StrokeName(StrEnum):
@@ -32,6 +35,10 @@ def latitudes(
     stroke: Annotated[
         list[StrokeName] | None, typer.Option(help="inflation or compression; default: both")
     ] = None,
+    fold: Annotated[
+        str | None,
+        typer.Option(help="also press one of many bellows by this much, its flanks in contact"),
+    ] = None,
     csv: Annotated[
         Path | None,
         typer.Option(help="write every point's greatest stress and rate to this file"),
@@ -41,6 +48,9 @@ def latitudes(
 
     Mean over the bellows of the largest von Mises stress at points A (trough) over F (crest) to J,
     on both faces of the wall, and how well the bellows agree (intraclass correlation).
+
+    Flanks that touch are told, not resisted, but for `--fold`: there one bellow of a long row is
+    pressed together, and its flanks push each other.
 
     Example: `rig latitudes --actuator models/actuators/bellow-joint.yaml --csv weak.csv`
     """
@@ -53,6 +63,7 @@ def latitudes(
     spec = load_actuator(actuator)
     material = Workspace.find(actuator).material(spec.material)
     geometry = _joint(spec)
+    most = None if fold is None else _fold_length(fold, geometry)
     strokes = {StrokeName.INFLATION: INFLATION, StrokeName.COMPRESSION: COMPRESSION}
     lines: list[tuple[str, ...]] = []
     for name in dict.fromkeys(stroke or tuple(StrokeName)):
@@ -62,8 +73,51 @@ def latitudes(
                 runs[how.value] = drive(geometry, material, strokes[name], how)
             lines += _rows(name, how, runs[how.value])
         _show(f"{spec.name}, {material.name}: {name}, von Mises stress in MPa", runs)
+    if most is not None:
+        _show_fold(f"one of many bellows, {material.name}, pressed", geometry, material, most)
     if csv is not None:
         _write(csv, lines)
+
+
+def _fold_length(text: str, geometry: BellowJointGeometry) -> float:
+    from rig.spec.quantity import to_si
+
+    try:
+        most = float(to_si(text, "m"))
+    except ValueError as error:
+        raise typer.BadParameter(f"--fold {text}: {error}; it wants '2.1 mm'.") from None
+    if not 0 < most < geometry.pitch:
+        raise typer.BadParameter(
+            f"--fold {text} must be above zero and below the pitch, {1e3 * geometry.pitch:.4g} mm."
+        )
+    return most
+
+
+def _show_fold(
+    title: str, geometry: BellowJointGeometry, material: MaterialSpec, most: float
+) -> None:
+    import numpy as np
+    from rich.console import Console
+    from rich.table import Table
+
+    from rig.mechanics.simulate.folding import fold
+
+    found = fold(geometry, material, np.linspace(0.0, most, FOLD_STEPS + 1))
+    shown = Table(title=title)
+    for heading in ("by\nmm", "force\nN", "outer flanks\nN", "inner flanks\nN"):
+        shown.add_column(heading, justify="right")
+    shown.add_column("von Mises\nMPa", justify="right")
+    shown.add_column("plastic\n%", justify="right")
+    columns = (
+        found.shortening * 1e3,
+        found.force,
+        *found.pushed.T,
+        found.von_mises / 1e6,
+        found.plastic * 100,
+    )
+    for row in zip(*columns, strict=True):
+        shown.add_row(*(f"{value:.2f}" for value in row))
+    Console().print(shown)
 
 
 def _joint(spec: ActuatorSpec) -> BellowJointGeometry:

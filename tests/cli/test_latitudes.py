@@ -26,10 +26,12 @@ def test_it_tells_every_latitude_and_writes_every_point(rig, short, tmp_path, mo
 
     monkeypatch.setattr(latitudes, "INFLATION", latitudes.Stroke(0.5e-3, 0.5))
     file = tmp_path / "weak.csv"
-    found = rig("latitudes", "--actuator", short, "--stroke", "inflation", "--csv", file)
+    given = ("--actuator", short, "--stroke", "inflation", "--fold", "2 mm", "--csv", file)
+    found = rig("latitudes", *given)
     assert found.code == 0, found.err
     assert "agreement of bellows, ICC" in found.out
     assert "Pumped: +0.5 mm at" in found.out
+    assert "outer flanks" in found.out
     rows = list(csv.DictReader(file.open(encoding="utf-8")))
     assert len(rows) == 2 * 2 * 2 * 10
     assert {row["latitude"] for row in rows} == set("ABCDEFGHIJ")
@@ -40,3 +42,10 @@ def test_other_families_are_refused(rig) -> None:
     found = rig("latitudes", "--actuator", ACTUATORS / "bellow-axisymmetric.yaml")
     assert found.code == 1
     assert "family 'bellow-joint'" in found.err
+
+
+@pytest.mark.parametrize(("text", "why"), [("9 mm", "below the pitch, 3 mm"), ("2 kPa", "2.1 mm")])
+def test_a_fold_that_is_none_is_refused_before_anything_is_computed(rig, short, text, why) -> None:
+    found = rig("latitudes", "--actuator", short, "--fold", text)
+    assert found.code == 2
+    assert why in found.err
