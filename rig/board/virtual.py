@@ -20,7 +20,7 @@ from rig.board.simulated import SimulatedBoard
 from rig.board.truth import TruthFile
 from rig.link.bus import SlcanBus
 from rig.mechanics.job import Job
-from rig.mechanics.profile import side_profile
+from rig.mechanics.outline import side_profile
 from rig.plant.camera import CameraFault, VirtualCamera
 from rig.plant.instruments import Instruments
 from rig.plant.plant import Fixture, Plant, plant_parameters

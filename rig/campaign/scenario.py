@@ -17,9 +17,8 @@ from rig.experiment.bench import Nobody
 from rig.experiment.plan import make_plan
 from rig.experiment.run import new_run
 from rig.experiment.setup import RunRequest
-from rig.mechanics.bellow import bending_geometry
 from rig.mechanics.job import Job
-from rig.mechanics.profile import cavity_volume
+from rig.mechanics.outline import bending_shape
 from rig.record.documents import PointDocument, PointKey
 from rig.record.errors import RecordError
 from rig.record.reader import RunReader
@@ -91,12 +90,11 @@ def run_scenario(
     script: FaultScript, setup: Setup, seed: int, folder: Path, job: Job | None = None
 ) -> Outcome:
     """Take a whole run into `folder` while `script` breaks the simulated bench."""
-    geometry = bending_geometry(setup.actuator, "A fault campaign")
     request = RunRequest(
         setup=setup,
         plan=make_plan(setup.protocol, setup.actuator, setup.bench),
         seed=seed,
-        cavity_volume=float(cavity_volume(geometry, 0.0)),
+        cavity_volume=bending_shape(setup.actuator.geometry).cavity_volume,
     )
     bench = VirtualBench(setup, seed, folder / "truth.mcap", faults=script, job=job)
     line = bench.line

@@ -17,8 +17,7 @@ from rig.experiment.bench import Bench
 from rig.experiment.identification import LoopRequest
 from rig.experiment.recorded import RunOutcome
 from rig.experiment.setup import require_valid_calibrations
-from rig.mechanics.bellow import bending_geometry
-from rig.mechanics.profile import cavity_volume
+from rig.mechanics.outline import bending_shape
 from rig.record.writer import require_free_folder
 from rig.spec.faults import FaultScript
 from rig.spec.workspace import Setup
@@ -31,11 +30,10 @@ def loop_request(setup: Setup, seed: int) -> LoopRequest:
     """The request of an experiment on the loop; raises ExperimentError for old calibrations."""
     require_valid_calibrations(setup.calibrations, date.today())
     simulated = setup.bench.simulated
-    geometry = bending_geometry(setup.actuator, "Work on the pressure loop")
     return LoopRequest(
         setup=setup,
         seed=seed,
-        cavity_volume=float(cavity_volume(geometry, 0.0)),
+        cavity_volume=bending_shape(setup.actuator.geometry).cavity_volume,
         created=None if simulated else datetime.now().astimezone().isoformat(timespec="seconds"),
     )
 

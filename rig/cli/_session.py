@@ -33,8 +33,7 @@ from rig.experiment.setup import (
     require_valid_calibrations,
 )
 from rig.link.errors import LinkError
-from rig.mechanics.bellow import bending_geometry
-from rig.mechanics.profile import cavity_volume
+from rig.mechanics.outline import bending_shape
 from rig.record.reader import RunReader
 from rig.record.writer import require_free_folder
 from rig.spec.faults import FaultScript
@@ -269,7 +268,7 @@ def _session(setup: Setup, seed: int, logs: Path, expired: bool) -> Session:
     if not expired:
         require_valid_calibrations(setup.calibrations, today)
     caution = expired_calibrations(setup.calibrations, today)
-    cavity = float(cavity_volume(bending_geometry(setup.actuator, "A characterisation"), 0.0))
+    cavity = bending_shape(setup.actuator.geometry).cavity_volume
     request = RunRequest(
         setup=setup,
         plan=make_plan(setup.protocol, setup.actuator, setup.bench),

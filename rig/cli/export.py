@@ -11,7 +11,7 @@ import typer
 from rig.cli.app import app
 
 if TYPE_CHECKING:
-    from rig.mechanics.simulate.bending import BendingModel
+    from rig.mechanics.deck.write import DeckModel
     from rig.spec.actuator import ActuatorSpec
 
 
@@ -69,7 +69,7 @@ def export(
 
     The soft part has its air inlet. Needs the CAD libraries: `pip install 'rig[cad]'`.
 
-    The input deck for CalculiX or Abaqus (mm, N, MPa) is half of the actuator by symmetry,
+    The input deck for CalculiX or Abaqus (mm, N, MPa) is the part that symmetry leaves,
     without the inlet, as `--model fe` computes it. CalculiX has no mixed tetrahedra: its own are
     several per cent too stiff at a Poisson's ratio of 0.49, its hexahedra are not.
 
@@ -88,35 +88,36 @@ def export(
         _write_deck(inp, spec, model, program, most)
 
 
-def _model(spec: ActuatorSpec, path: Path, elements: Elements, size: str | None) -> BendingModel:
+def _model(spec: ActuatorSpec, path: Path, elements: Elements, size: str | None) -> DeckModel:
     from rig.mechanics.bellow import bending_geometry
-    from rig.mechanics.mesh.bellow_bending import mesh_bending_bellow
+    from rig.mechanics.deck.build import deck_model
     from rig.mechanics.mesh.bellow_tetrahedra import mesh_bending_bellow_tetrahedra
     from rig.mechanics.simulate.bending import bending_model_on
     from rig.spec.workspace import Workspace
 
     material = Workspace.find(path).material(spec.material)
-    geometry = bending_geometry(spec, "The input deck")
     if elements is Elements.HEXAHEDRA:
         if size is not None:
             raise typer.BadParameter("--size is of tetrahedra; hexahedra follow the geometry.")
-        return bending_model_on(mesh_bending_bellow(geometry), material)
+        return deck_model(spec, material)
+    geometry = bending_geometry(spec, "A deck of tetrahedra")
     largest = None if size is None else _quantity("--size", size, "m")
     return bending_model_on(mesh_bending_bellow_tetrahedra(geometry, largest), material)
 
 
 def _write_deck(
-    path: Path, spec: ActuatorSpec, model: BendingModel, program: Program, pressure: float
+    path: Path, spec: ActuatorSpec, model: DeckModel, program: Program, pressure: float
 ) -> None:
     from rig.mechanics.deck import elements as deck
     from rig.mechanics.deck.write import write_deck
 
     chosen = deck.Program(program.value)
     write_deck(path, model, pressure=pressure, program=chosen, title=spec.name)
-    d = model.soft.discretisation
+    d = model.model.discretisation
+    part = "half" if len(model.planes) == 1 else "a quarter"
     typer.echo(
         f"{path}: {len(d.connectivity)} {deck.elements_of(d).type.names[chosen]} for {program}, "
-        f"half of the actuator, up to {pressure / 1e3:g} kPa; mm, N, MPa"
+        f"{part} of the actuator, up to {pressure / 1e3:g} kPa; mm, N, MPa"
     )
 
 

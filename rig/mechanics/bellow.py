@@ -95,6 +95,31 @@ class BellowShape:
         return -(self.outer_radius + self.bottom_thickness)
 
     @property
+    def start(self) -> float:
+        """x of the clamped face, -t."""
+        return -self.wall
+
+    @property
+    def end(self) -> float:
+        """x where the rigid end cap begins, L + t."""
+        return self.effective_length + self.wall
+
+    @property
+    def gap(self) -> float:
+        """Between the outsides of neighbouring flanks at rest."""
+        return 2 * (self.trough_arc - self.wall)
+
+    @property
+    def half_width(self) -> float:
+        """Half of the bottom layer's width."""
+        return self.average_radius + self.wall
+
+    @property
+    def fibre_distance(self) -> float:
+        """Between the underside and the crests of the cavity, 2 ro + tb."""
+        return 2 * self.outer_radius + self.bottom_thickness
+
+    @property
     def end_wall_top(self) -> float:
         """Highest z of the end walls and the end cap, ri + t."""
         return self.inner_radius + self.wall

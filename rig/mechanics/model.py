@@ -67,6 +67,9 @@ _PREDICTORS: dict[tuple[str, str], Predictor] = {
     ("bellow-axisymmetric", "fe"): finite_elements,
     ("bellow-gripper", "fe"): finite_elements,
     ("bellow-joint", "fe"): finite_elements,
+    ("bellow-rectangular", "fe"): finite_elements,
+    ("multi-chamber-bending", "fe"): finite_elements,
+    ("multi-chamber-linear", "fe"): finite_elements,
 }
 
 

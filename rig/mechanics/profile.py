@@ -12,6 +12,7 @@ Pure geometry: the beam model uses it, and so may a specimen whose angle comes f
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,7 +41,21 @@ _BOTTOM_POINTS = 49
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 
-def wrap(shape: BellowShape, angle: ArrayLike, x: ArrayLike, height: ArrayLike) -> Array:
+class BentBar(Protocol):
+    """What bends to an arc, metres."""
+
+    @property
+    def effective_length(self) -> float:
+        """Length from x = 0 on that bends; what lies beyond stays straight."""
+        ...
+
+    @property
+    def underside(self) -> float:
+        """z of the fibre that keeps its length."""
+        ...
+
+
+def wrap(shape: BentBar, angle: ArrayLike, x: ArrayLike, height: ArrayLike) -> Array:
     """Place material points of the bent actuator in the plane of bending, (..., 2) as (x, z).
 
     `x` is the coordinate along the underside before bending, `height` the distance from the

@@ -10,11 +10,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.mechanics.profile import side_profile
+from rig.mechanics.outline import side_profile
 from rig.plant.layout import ProfileFunction, lay_out
 from rig.plant.optics import Lens, draw_lens, draw_projection
 from rig.plant.scene import Image, Light, Scene, Surface, linear
-from rig.spec.actuator import BellowBendingGeometry
+from rig.spec.actuator import Geometry
 from rig.spec.bench import VirtualOptics
 from rig.spec.calibration import RulerCalibration
 
@@ -107,7 +107,7 @@ class VirtualCamera:
         self,
         optics: VirtualOptics,
         ruler: RulerCalibration,
-        geometry: BellowBendingGeometry,
+        geometry: Geometry,
         jpeg_quality: int,
         rng: np.random.Generator,
         profile: ProfileFunction = side_profile,

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rig.mechanics.bellow import BellowShape
+from rig.mechanics.outline import bending_shape
 from rig.plant.specimen import Specimen
 
 
@@ -21,7 +21,7 @@ def moment_of_inertia(specimen: Specimen, fluid_density: float) -> float:
     A slice at x goes sideways by theta x^2 / 2 L: what is spread along the length L counts L^2/20,
     the cap at its end L^2/4. `fluid_density` in kg/m3 is of what fills the cavity.
     """
-    shape = BellowShape.of(specimen.geometry)
+    shape = bending_shape(specimen.geometry)
     cavity = float(np.interp(0.0, specimen.pressure, specimen.volume_free))
     spread = shape.soft_mass(specimen.density) + fluid_density * cavity
     square = shape.effective_length**2

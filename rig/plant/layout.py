@@ -13,10 +13,10 @@ import numpy as np
 from rig.mechanics.response import SideProfile
 from rig.plant.errors import SceneError
 from rig.plant.optics import Array, Projection
-from rig.spec.actuator import BellowBendingGeometry
+from rig.spec.actuator import Geometry
 from rig.spec.calibration import RulerCalibration
 
-ProfileFunction = Callable[[BellowBendingGeometry, float], SideProfile]
+ProfileFunction = Callable[[Geometry, float], SideProfile]
 """Side profile of a geometry at a bending angle in rad."""
 
 RULER_WIDTH = 0.012
@@ -78,7 +78,7 @@ def mark_centres(corner: tuple[float, float], ruler: RulerCalibration, lean: flo
 
 
 def lay_out(
-    geometry: BellowBendingGeometry,
+    geometry: Geometry,
     ruler: RulerCalibration,
     projection: Projection,
     profile: ProfileFunction,
@@ -121,7 +121,7 @@ def lay_out(
     return layout
 
 
-def _swept_outlines(geometry: BellowBendingGeometry, profile: ProfileFunction) -> list[Array]:
+def _swept_outlines(geometry: Geometry, profile: ProfileFunction) -> list[Array]:
     outlines = []
     for angle in np.linspace(*ANGLE_RANGE, 17):
         shape = profile(geometry, float(angle))

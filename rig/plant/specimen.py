@@ -14,12 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from rig.mechanics.bellow import bending_geometry
 from rig.mechanics.job import Job
 from rig.plant.beam_truth import beam_truth
 from rig.plant.errors import SpecimenError
 from rig.plant.fe_truth import finite_element_truth
-from rig.spec.actuator import ActuatorSpec, BellowBendingGeometry
+from rig.spec.actuator import ActuatorSpec, Geometry
 from rig.spec.bench import BeamSpecimen, FiniteElementSpecimen
 from rig.spec.material import MaterialSpec
 
@@ -49,7 +48,7 @@ class Specimen:
     """Volume of the cavity in m3, tip free."""
     volume_blocked: Array
     """Volume of the cavity in m3, tip at the stop."""
-    geometry: BellowBendingGeometry
+    geometry: Geometry
     """As printed."""
     young_modulus: float
     """As printed, Pa."""
@@ -127,12 +126,12 @@ def draw_specimen(
     )
 
 
-def _printed(actuator: ActuatorSpec, wall_factor: float) -> BellowBendingGeometry:
+def _printed(actuator: ActuatorSpec, wall_factor: float) -> Geometry:
     """The geometry with another wall, checked again: the constraints bind prints, too."""
-    geometry = bending_geometry(actuator, "The virtual bench")
+    geometry = actuator.geometry
     thickness = geometry.wall_thickness * wall_factor
     try:
-        return BellowBendingGeometry.model_validate(
+        return type(geometry).model_validate(
             geometry.model_dump(mode="json") | {"wall_thickness": f"{thickness!r} m"}
         )
     except ValidationError as error:

@@ -11,6 +11,11 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from rig.spec.base import Count, Name, SpecModel, require
+from rig.spec.chambers import (
+    BellowRectangularGeometry,
+    MultiChamberBendingGeometry,
+    MultiChamberLinearGeometry,
+)
 from rig.spec.quantity import Length, Pressure, Ratio
 
 ModelName = Literal["beam", "fe"]
@@ -211,7 +216,10 @@ Geometry = Annotated[
     BellowBendingGeometry
     | BellowAxisymmetricGeometry
     | BellowJointGeometry
-    | BellowGripperGeometry,
+    | BellowGripperGeometry
+    | BellowRectangularGeometry
+    | MultiChamberBendingGeometry
+    | MultiChamberLinearGeometry,
     Field(discriminator="family"),
 ]
 

@@ -14,6 +14,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from rig.mechanics.fe import Point, Result, follow
 from rig.mechanics.fe.linear import SuperLU, default_solver
 from rig.mechanics.mesh.bellow_bending import BendingResolution
 from rig.mechanics.simulate.bending import FREE_OPTIONS, BendingModel, bending_model
-from rig.mechanics.simulate.blocked import BLOCKED_OPTIONS, blocked_bending_model
+from rig.mechanics.simulate.blocked import BLOCKED_OPTIONS, Blocked
 from rig.spec.actuator import BellowBendingGeometry
 from rig.spec.material import MaterialSpec
 from rig.spec.quantity import STANDARD_GRAVITY
@@ -129,7 +130,7 @@ def blocked() -> Iterator[str]:
     head = "".join(f"{p / 1e3:>9.0f}" for p in TOLD)
     yield f"{'force in g at kPa':<20}{head}{'elements':>10}{'s':>7}{'solves':>8}{'assembly':>10}"
     for name in FORCED:
-        held = blocked_bending_model(*_setup(), resolution=REFINED[name])
+        held = Blocked(partial(bending_model, resolution=REFINED[name]))(*_setup())
         result = follow(held.model, [Point(p) for p in PRESSURES], options=BLOCKED_OPTIONS)
         weight = held.measures(result.solutions[0])["force"]
         found = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -10,11 +11,12 @@ import pytest
 from rig.mechanics.fe import Point, Pose, Result, follow, rotation_vector
 from rig.mechanics.fe.rotation import rotation_matrix
 from rig.mechanics.mesh.bellow_bending import BendingResolution
+from rig.mechanics.simulate.bending import bending_model
 from rig.mechanics.simulate.blocked import (
     BLOCKED_OPTIONS,
+    Blocked,
     BlockedBendingModel,
     TipStop,
-    blocked_bending_model,
 )
 from rig.spec.actuator import BellowBendingGeometry
 
@@ -40,7 +42,8 @@ class Held:
 
 
 def held(geometry, material, *pressures, **of_the_model) -> Held:
-    actuator = blocked_bending_model(geometry, material, resolution=COARSE, **of_the_model)
+    build = partial(bending_model, resolution=COARSE, **of_the_model)
+    actuator = Blocked(build)(geometry, material)
     points = [Point(0.0), *map(Point, pressures)]
     return Held(actuator, follow(actuator.model, points, options=BLOCKED_OPTIONS))
 

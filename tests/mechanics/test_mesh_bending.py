@@ -102,17 +102,6 @@ def test_the_cap_s_centre_is_that_of_the_face_it_covers(levels):
     assert shape.cap_centre[0] == pytest.approx(np.mean(thickness))
 
 
-def test_far_lower_edge_lies_where_the_cap_begins(levels):
-    level = levels[0]
-    x, y, z = level.mesh.doflocs[:, level.bottom_far_edge]
-    shape = level.shape
-    assert x == pytest.approx(shape.effective_length + shape.wall)
-    assert z == pytest.approx(shape.underside)
-    assert y.min() == pytest.approx(0, abs=1e-12)
-    assert y.max() == pytest.approx(shape.average_radius + shape.wall)
-    assert y.size == 2 * (level.resolution.plate + level.resolution.wall) + 1
-
-
 def test_inner_nodes_of_the_crest_lie_on_its_torus(levels):
     """Every node of the cavity above the axis is r1 or r2 from a centre circle, or on a plane."""
     level = levels[0]

@@ -4,6 +4,8 @@ Bending bellow: the toolbox's solid exactly (Section II-A of Yao et al. and the 
 air inlet included. The inlet's place and the connector's outline are nowhere stated: here the
 inlet lies on the revolving axis and goes on through the connector, which is a plate as wide as
 the bottom layer and t more on each side, from the underside to t above the end wall.
+
+Rows of chambers: their segments, with an inlet as wide as the narrowest passage.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from numpy.typing import NDArray
 
 from rig.mechanics.bellow import INLET_RADIUS, BellowShape
 from rig.mechanics.cad.construct import Arc, Combined, Line, Part, Point, Prism, Revolved
+from rig.mechanics.chambers import ChamberRow, Rectangle
 from rig.mechanics.mesh.bellow_axisymmetric import AxisymmetricBellow
 from rig.mechanics.mesh.bellow_joint import JointBellow
 from rig.spec.actuator import (
@@ -43,6 +46,8 @@ def parts_of(geometry: Geometry) -> tuple[Part, ...]:
             return parts_of(geometry.finger)
         case BellowJointGeometry():
             return (Part("soft", joint_soft_body(JointBellow.of(geometry)), is_soft=True),)
+        case _:
+            return _chamber_parts(ChamberRow.of(geometry))
 
 
 def _bending_parts(shape: BellowShape) -> tuple[Part, ...]:
@@ -70,6 +75,41 @@ def bending_soft_body(shape: BellowShape, *, inlet: bool = True) -> Combined:
         ),
         removed=(*cavity, *holes),
     )
+
+
+def _chamber_parts(row: ChamberRow) -> tuple[Part, ...]:
+    last = row.segments[-1].outline
+    cap = Combined((_box(last, row.end, row.tip),))
+    parts = [Part("soft", chamber_soft_body(row), is_soft=True), Part("cap", cap, is_soft=False)]
+    if row.layer:
+        parts.append(Part("layer", Combined((_layer(row),)), is_soft=False))
+    return tuple(parts)
+
+
+def chamber_soft_body(row: ChamberRow) -> Combined:
+    """All segments in one, with an inlet through the first wall, but for the layer below."""
+    outside, cavity = [], []
+    for start, end, segment in zip(row.starts(), row.starts()[1:], row.segments, strict=False):
+        outside.append(_box(segment.outline, float(start), float(end)))
+        if segment.cavity is not None:
+            cavity.append(_box(segment.cavity, float(start), float(end)))
+    # through the solid first segment, as wide as the narrowest cavity behind it
+    narrowest = min(
+        (s.cavity for s in row.segments if s.cavity is not None), key=lambda cavity: cavity.area
+    )
+    cavity.append(_box(narrowest, row.start, float(row.starts()[1])))
+    removed = (*cavity, _layer(row)) if row.layer else tuple(cavity)
+    return Combined(tuple(outside), removed)
+
+
+def _layer(row: ChamberRow) -> Prism:
+    below = Rectangle(row.half_width, row.underside, row.underside + row.layer)
+    return _box(below, row.start, row.end)
+
+
+def _box(section: Rectangle, start: float, end: float) -> Prism:
+    y, low, high = section.half_width, section.low, section.high
+    return Prism(((-y, low), (y, low), (y, high), (-y, high)), start, end)
 
 
 def axisymmetric_soft_body(shape: AxisymmetricBellow) -> Combined:

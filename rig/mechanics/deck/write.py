@@ -1,4 +1,4 @@
-"""The bending bellow as an input deck (`.inp`) of Abaqus or CalculiX: mm, N, MPa, tonne, s.
+"""An actuator in space as an input deck (`.inp`) of Abaqus or CalculiX: mm, N, MPa, tonne, s.
 
 The same mesh, sets, material, rigid cap and loads as the finite element model it is made from:
 first its weight, then the pressure of the cavity, which follows the deformed surface because the
@@ -9,8 +9,9 @@ rotation a node of its own.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,8 @@ from numpy.typing import NDArray
 from rig.mechanics.deck.elements import Elements, Program, elements_of, faces_of
 from rig.mechanics.deck.errors import DeckError
 from rig.mechanics.deck.material import hyperelasticity
-from rig.mechanics.simulate.bending import BendingModel
+from rig.mechanics.fe import Model, RigidBody, Solid
+from rig.mechanics.fe.rigid import MOTIONS
 
 Indices = NDArray[np.int64]
 
@@ -28,11 +30,38 @@ _MEGAPASCAL = 1e6
 _PER_LINE = 16
 """Entries of a data line at most, in both programs."""
 _REPORTED = "REPORTED"
+_SOLIDS = ("SOFT", "LAYER")
+"""Element sets of a model's solids, in their order."""
+
+
+@runtime_checkable
+class DeckModel(Protocol):
+    """What a deck is made from."""
+
+    @property
+    def model(self) -> Model:
+        """Solids, one rigid cap and the cavity; its boundaries `clamped` and `cap`."""
+        ...
+
+    @property
+    def planes(self) -> Mapping[str, int]:
+        """Boundaries on planes of symmetry, to the component of displacement that they hold."""
+        ...
+
+    @property
+    def density(self) -> float:
+        """In kg/m3."""
+        ...
+
+    @property
+    def acceleration(self) -> tuple[float, float, float]:
+        """Gravity in m/s2."""
+        ...
 
 
 def write_deck(
     path: Path,
-    actuator: BendingModel,
+    actuator: DeckModel,
     *,
     pressure: float,
     program: Program = Program.CALCULIX,
@@ -54,9 +83,9 @@ def write_deck(
 
 
 def _lines(
-    actuator: BendingModel, pressure: float, program: Program, increments: int, title: str
+    actuator: DeckModel, pressure: float, program: Program, increments: int, title: str
 ) -> Iterator[str]:
-    d = actuator.soft.discretisation
+    d = actuator.model.discretisation
     elements = elements_of(d)
     cap = actuator.model.bodies[0]
     used = np.unique(elements.nodes)
@@ -64,9 +93,10 @@ def _lines(
     own_rotation = program is Program.CALCULIX
 
     yield "*HEADING"
-    yield f"{title or 'bending bellow'}: half of it, y >= 0, by rig"
-    yield "** Units: mm, N, MPa, tonne, s. x along the axis, z up to the crests."
-    yield f"** Half a model: weight of the cap {cap.weight[0]:.6g} N is half of the cap's."
+    part = {1: "half", 2: "a quarter"}[len(actuator.planes)]
+    yield f"{title or 'actuator'}: {part} of it, by rig"
+    yield "** Units: mm, N, MPa, tonne, s. x along the axis; y = 0 is a plane of symmetry."
+    yield f"** Weight of the modelled part of the cap: {cap.weight[0]:.6g} N."
     yield "*NODE, NSET=ALL"
     for node in used:
         yield _row(node + 1, *(_MM * d.nodes[node]))
@@ -75,31 +105,46 @@ def _lines(
     if own_rotation:
         yield "*NODE, NSET=CAP_ROTATION"
         yield _row(rotation, *(_MM * cap.centre))
-    yield f"*ELEMENT, TYPE={elements.type.names[program]}, ELSET=SOFT"
-    for number, nodes in enumerate(elements.nodes, start=1):
-        yield from _rows((number, *(nodes + 1)), carry_on=True)
+    for name, solid in zip(_SOLIDS, actuator.model.solids, strict=False):
+        yield f"*ELEMENT, TYPE={elements.type.names[program]}, ELSET={name}"
+        for number in solid.elements:
+            yield from _rows((number + 1, *(elements.nodes[number] + 1)), carry_on=True)
 
     cap_nodes = np.intersect1d(cap.nodes, used)
-    # the cap's own freedoms decide about its nodes on the plane of symmetry
-    symmetry = np.setdiff1d(np.intersect1d(d.nodes_on("symmetry"), used), cap_nodes)
-    clamped = np.intersect1d(d.nodes_on("clamped"), used)
-    for name, nodes in {"CLAMPED": clamped, "SYMMETRY": symmetry, "CAP": cap_nodes}.items():
+    # the cap's own freedoms decide about its nodes on planes of symmetry
+    supports = {
+        "CLAMPED": (np.intersect1d(d.nodes_on("clamped"), used), (1, 3)),
+        **{
+            name.upper(): (
+                np.setdiff1d(np.intersect1d(d.nodes_on(name), used), cap_nodes),
+                (component + 1, component + 1),
+            )
+            for name, component in actuator.planes.items()
+        },
+    }
+    sets = {name: nodes for name, (nodes, _) in supports.items()} | {"CAP": cap_nodes}
+    for name, nodes in sets.items():
         yield f"*NSET, NSET={name}"
         yield from _rows(nodes + 1)
     if own_rotation:
         # CalculiX cuts its increments as it likes; at these it stops and prints
-        yield f"*TIME POINTS, NAME={_REPORTED}, GENERATE"
-        yield f"{1 / increments:.9g}, 1, {1 / increments:.9g}"
+        yield f"*TIME POINTS, NAME={_REPORTED}"
+        times = [number / increments for number in range(1, increments + 1)]
+        yield from (_row(*times[i : i + 8]) for i in range(0, increments, 8))
     faces = yield from _surfaces(actuator, elements)
     yield from _material(actuator)
-    yield from _supports(reference, rotation if own_rotation else None)
+    yield from _cap(cap, reference, rotation if own_rotation else None)
+    for name, (_, (first, last)) in supports.items():
+        yield f"{name}, {first}, {last}"
 
     size = float(np.linalg.norm(actuator.acceleration))
     if size > 0:
         yield from _step(1)
         yield "*DLOAD"
-        direction = (c / size for c in actuator.acceleration)
-        yield "SOFT, GRAV, " + _row(_MM * size, *direction)
+        direction = [c / size for c in actuator.acceleration]
+        pull = _row(_MM * size, *direction)
+        for name in _SOLIDS[: len(actuator.model.solids)]:
+            yield f"{name}, GRAV, {pull}"
         yield "*CLOAD"
         for component, force in enumerate(cap.weight, start=1):
             if force:
@@ -112,9 +157,9 @@ def _lines(
     yield from _output(own_rotation)
 
 
-def _surfaces(actuator: BendingModel, elements: Elements) -> Generator[str, None, list[int]]:
+def _surfaces(actuator: DeckModel, elements: Elements) -> Generator[str, None, list[int]]:
     """The cavity's wall as element sets by face and as a surface; returns the faces there are."""
-    d = actuator.soft.discretisation
+    d = actuator.model.discretisation
     owners = faces_of(elements, d.mesh, d.facets_on("cavity"))
     faces = [int(face) + 1 for face in np.unique(owners[:, 1])]
     for face in faces:
@@ -126,33 +171,38 @@ def _surfaces(actuator: BendingModel, elements: Elements) -> Generator[str, None
     return faces
 
 
-def _material(actuator: BendingModel) -> Iterator[str]:
-    law = hyperelasticity(actuator.soft.distortion, actuator.soft.volume)
-    yield "*SOLID SECTION, ELSET=SOFT, MATERIAL=ELASTOMER"
+def _material(actuator: DeckModel) -> Iterator[str]:
+    for name, solid in zip(_SOLIDS, actuator.model.solids, strict=False):
+        yield from _section(name, solid, actuator.density)
+
+
+def _section(name: str, solid: Solid, density: float) -> Iterator[str]:
+    law = hyperelasticity(solid.distortion, solid.volume)
+    yield f"*SOLID SECTION, ELSET={name}, MATERIAL={name}_ELASTOMER"
     yield ""
-    yield "*MATERIAL, NAME=ELASTOMER"
+    yield f"*MATERIAL, NAME={name}_ELASTOMER"
     if law.remark:
         yield f"** {law.remark}"
     yield f"*HYPERELASTIC, {law.model}"
     yield from (_row(*law.constants[i : i + 8]) for i in range(0, len(law.constants), 8))
     yield "*DENSITY"
-    yield f"{actuator.density * _TONNE_PER_MM3:.9g}"
+    yield f"{density * _TONNE_PER_MM3:.9g}"
 
 
-def _supports(reference: int, rotation: int | None) -> Iterator[str]:
+def _cap(cap: RigidBody, reference: int, rotation: int | None) -> Iterator[str]:
+    """The rigid cap and the motions that it may not do, under `*BOUNDARY`."""
     if rotation is None:
         yield f"*RIGID BODY, REF NODE={reference}, TIE NSET=CAP"
     else:
         yield f"*RIGID BODY, NSET=CAP, REF NODE={reference}, ROT NODE={rotation}"
     yield "*BOUNDARY"
-    yield "CLAMPED, 1, 3"
-    yield "SYMMETRY, 2, 2"
-    yield f"{reference}, 2, 2"
-    for axis in (1, 3):
-        if rotation is None:
-            yield f"{reference}, {axis + 3}, {axis + 3}"
+    for number, motion in enumerate(MOTIONS, start=1):
+        if motion in cap.free:
+            continue
+        if number > 3 and rotation is not None:
+            yield f"{rotation}, {number - 3}, {number - 3}"
         else:
-            yield f"{rotation}, {axis}, {axis}"
+            yield f"{reference}, {number}, {number}"
 
 
 def _step(increments: int) -> Iterator[str]:

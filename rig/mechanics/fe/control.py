@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.mechanics.fe.model import Assembly, Model
-from rig.mechanics.fe.rotation import rotation_vector
 from rig.mechanics.fe.state import State
 
 Array = NDArray[np.float64]
@@ -115,7 +114,7 @@ class DisplacementControl:
 
 @dataclass(frozen=True)
 class AngleControl:
-    """The rotation in rad of one rigid body about one axis, up to half a turn."""
+    """The rotation in rad of one rigid body about one axis."""
 
     motion: str = "about_y"
     body: int = 0
@@ -124,8 +123,8 @@ class AngleControl:
 
     def value(self, at: Situation, /) -> float:
         """The component of the rotation vector in rad."""
-        vector = rotation_vector(at.state.poses[self.body].rotation)
-        return float(vector[("about_x", "about_y", "about_z").index(self.motion)])
+        angles = at.state.poses[self.body].angles
+        return float(angles[("about_x", "about_y", "about_z").index(self.motion)])
 
     def slope(self, at: Situation, /) -> Slope:
         """One for the spin about the axis: exact while the body turns about that axis only."""

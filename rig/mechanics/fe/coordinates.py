@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from rig.mechanics.fe.discretisation import Discretisation
 from rig.mechanics.fe.rigid import RigidBody
-from rig.mechanics.fe.rotation import rotation_vector
 from rig.mechanics.fe.state import Pose, State
 
 Array = NDArray[np.float64]
@@ -102,7 +101,7 @@ class Bending:
         return np.concatenate((x, blend(weights, [s.x[self._size :] for s in states]))), shifted
 
     def _curvature(self, poses: tuple[Pose, ...]) -> float:
-        return float(rotation_vector(poses[0].rotation)[1]) / self._length
+        return float(poses[0].angles[1]) / self._length
 
     def _flat(self, state: State, curvature: float) -> Array:
         """(s, y, z) of all nodes and the body's reference point, (nodes + 1, 3), in m."""

@@ -290,9 +290,10 @@ def _pressure_volume(d: Discretisation) -> Array:
 
 
 def _blended_pose(poses: Sequence[Pose], weights: Array) -> Pose:
-    last = poses[-1].rotation
-    spin = blend(weights, [rotation_vector(p.rotation @ last.T) for p in poses])
-    return Pose(blend(weights, [p.shift for p in poses]), rotation_matrix(spin) @ last)
+    last = poses[-1]
+    spin = blend(weights, [rotation_vector(p.rotation @ last.rotation.T) for p in poses])
+    shift = blend(weights, [p.shift for p in poses])
+    return Pose(shift, rotation_matrix(spin) @ last.rotation, last.angles + spin)
 
 
 def _no_dofs() -> Integers:

@@ -90,7 +90,11 @@ class RigidBody:
         """The pose after an increment of the freedoms (m and rad)."""
         full = np.zeros(6)
         full[self._free] = increment
-        return Pose(pose.shift + full[:3], rotation_matrix(full[3:]) @ pose.rotation)
+        return Pose(
+            pose.shift + full[:3],
+            rotation_matrix(full[3:]) @ pose.rotation,
+            pose.angles + full[3:],
+        )
 
     def lever(self) -> Array:
         """Per freedom the length in m that makes its moment a force; 1 for forces."""

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.mechanics.fe.rotation import rotation_vector
+
 Array = NDArray[np.float64]
 
 
@@ -34,6 +36,13 @@ class Pose:
     """Displacement of the reference point in m, (3,)."""
     rotation: Array = field(default_factory=lambda: np.eye(3))
     """Rotation matrix, (3, 3)."""
+    turn: Array | None = None
+    """All spins that led there added up in rad, (3,); None for the rotation's own vector."""
+
+    @property
+    def angles(self) -> Array:
+        """Rotation vector in rad, (3,), past half a turn, too, where it turned about one axis."""
+        return rotation_vector(self.rotation) if self.turn is None else self.turn
 
 
 @dataclass(frozen=True)

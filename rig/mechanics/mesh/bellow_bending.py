@@ -100,8 +100,6 @@ class BendingBellowMesh:
     mesh: CurvedHex
     """27-node hexahedra with the facet sets `clamped` (x = -t), `cap` (x = L + t), `symmetry`
     (y = 0), `cavity` and `outside` as boundaries; together they are the whole boundary."""
-    bottom_far_edge: Indices
-    """Nodes (columns of `mesh.doflocs`) of the edge x = L + t, z = -(ro + tb)."""
     shape: BellowShape
     resolution: BendingResolution
 
@@ -127,11 +125,8 @@ def mesh_bending_bellow(
         "cavity": named["cavity"],
     }
     sets["outside"] = np.setdiff1d(boundary, np.concatenate(list(sets.values())))
-    x, _, z = mesh.doflocs
-    edge = (np.abs(x - length - wall) < 1e-9) & (np.abs(z - shape.underside) < 1e-9)
     return BendingBellowMesh(
         mesh=mesh.with_boundaries(sets, boundaries_only=False),
-        bottom_far_edge=np.flatnonzero(edge),
         shape=shape,
         resolution=resolution,
     )

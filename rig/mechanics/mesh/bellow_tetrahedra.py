@@ -42,8 +42,6 @@ class TetrahedralBellowMesh:
     mesh: CurvedTet
     """10-node tetrahedra with the boundaries `clamped`, `cap`, `symmetry`, `cavity` and `outside`
     as in `bellow_bending`."""
-    bottom_far_edge: Indices
-    """Nodes (columns of `mesh.doflocs`) of the edge x = L + t, z = -(ro + tb)."""
     shape: BellowShape
     straightened: int
     """Elements whose curved edges were made straight because they would have been inverted."""
@@ -72,11 +70,8 @@ def mesh_bending_bellow_tetrahedra(
     sets = {"clamped": on(0, -wall), "cap": on(0, length + wall), "symmetry": on(1, 0.0)}
     rest = np.setdiff1d(boundary, np.concatenate(list(sets.values())))
     sets["cavity"], sets["outside"] = _inside_and_outside(mesh, rest)
-    x, _, z = mesh.doflocs
-    edge = (np.abs(x - length - wall) < _PLANE) & (np.abs(z - shape.underside) < _PLANE)
     return TetrahedralBellowMesh(
         mesh=mesh.with_boundaries(sets, boundaries_only=False),
-        bottom_far_edge=np.flatnonzero(edge),
         shape=shape,
         straightened=straightened,
     )

@@ -1,20 +1,19 @@
-"""The bending bellow as a finite element model: half by symmetry, hanging from its connector.
+"""An actuator that bends as a finite element model: half by symmetry, hanging from its connector.
 
 The connector's face holds the soft end wall; the end cap is an exact rigid body. Both follow the
-toolbox's model (Yao, He and Maiolino, Section IV-B): neo-Hookean unless the material says
-otherwise, mixed in pressure, follower pressure in the cavity, gravity along the axis.
+toolbox's model of the bending bellow (Yao, He and Maiolino, Section IV-B): neo-Hookean unless the
+material says otherwise, mixed in pressure, follower pressure in the cavity, gravity along the axis.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.mechanics.bellow import BellowShape
 from rig.mechanics.fe import (
     Discretisation,
     Model,
@@ -27,18 +26,14 @@ from rig.mechanics.fe import (
     Support,
     discretise,
     gravity,
-    rotation_vector,
 )
 from rig.mechanics.fe.coordinates import Bending
 from rig.mechanics.fe.model import Item
-from rig.mechanics.mesh.bellow_bending import (
-    BendingBellowMesh,
-    BendingResolution,
-    mesh_bending_bellow,
-)
-from rig.mechanics.mesh.bellow_tetrahedra import TetrahedralBellowMesh
+from rig.mechanics.hyperelastic import Energy, Volumetric
+from rig.mechanics.mesh.bellow_bending import BendingResolution, mesh_bending_bellow
 from rig.mechanics.simulate.energies import mixed_energies
 from rig.mechanics.simulate.flanks import Flanks
+from rig.mechanics.simulate.shape import BendingBody, BendingShape
 from rig.spec.actuator import BellowBendingGeometry
 from rig.spec.material import MaterialSpec
 from rig.spec.quantity import STANDARD_GRAVITY
@@ -53,14 +48,21 @@ actuator is softest at first: a short step there leaves something to extrapolate
 
 
 @dataclass(frozen=True)
+class Layer:
+    """Elements of another material."""
+
+    elements: NDArray[np.int64]
+    distortion: Energy
+    volume: Volumetric
+
+
+@dataclass(frozen=True)
 class BendingModel:
     """Half of the actuator (y >= 0), with what turns its state into angles and volumes."""
 
     model: Model
     soft: Solid
-    shape: BellowShape
-    lower_edge: NDArray[np.int64]
-    """Nodes of the soft body's far lower edge, x = L + t at the underside."""
+    shape: BendingShape
     density: float
     """Of the soft material in kg/m3."""
     acceleration: tuple[float, float, float]
@@ -68,17 +70,14 @@ class BendingModel:
     mirror: int = 1
     """The plane of symmetry is y = 0."""
 
+    @property
+    def planes(self) -> Mapping[str, int]:
+        """Boundaries on planes of symmetry, to the component of displacement that they hold."""
+        return {"symmetry": 1}
+
     def angle(self, state: State) -> float:
         """Bending angle in rad: the end cap against the connector."""
-        return float(rotation_vector(state.poses[0].rotation)[1])
-
-    def chord_angle(self, state: State) -> float:
-        """The toolbox's 2 atan(w / (L + 2 t - u)) of the cap's far lower edge, in rad.
-
-        It is the bending angle of a perfect arc; the difference tells how far from one it is.
-        """
-        x, z = self.tip(state)
-        return float(2 * np.arctan2(self.shape.underside - z, x))
+        return float(state.poses[0].angles[1])
 
     def tip(self, state: State) -> Array:
         """The cap's far lower edge, (2,) as (x, z) in m."""
@@ -88,12 +87,11 @@ class BendingModel:
         return np.asarray(moved[[0, 2]])
 
     def displacement(self, state: State) -> float:
-        """Length difference in m between the fibres at the crests' cavity and at the underside.
+        """Length difference in m between the fibres under the cavity's roof and at the underside.
 
-        The end faces stay plane, so it is the angle times the distance 2 ro + tb of these fibres.
+        The end faces stay plane, so it is the angle times the distance of these fibres.
         """
-        shape = self.shape
-        return self.angle(state) * (2 * shape.outer_radius + shape.bottom_thickness)
+        return self.angle(state) * self.shape.fibre_distance
 
     def volume(self, solution: Solution) -> float:
         """Volume of the whole cavity in m3."""
@@ -103,8 +101,7 @@ class BendingModel:
     def flanks(self) -> Flanks:
         """What watches the folds of outside and cavity."""
         shape = self.shape
-        between = 2 * (shape.trough_arc - shape.wall)
-        return Flanks(self.model.discretisation, between=between, wall=shape.wall)
+        return Flanks(self.model.discretisation, between=shape.gap, wall=shape.wall)
 
     def measures(self, solution: Solution) -> dict[str, float]:
         """Angle, displacement and volume, as `Response` has them; the gap between flanks in m."""
@@ -123,7 +120,7 @@ def bending_model(
     resolution: BendingResolution | None = None,
     acceleration: tuple[float, float, float] = HANGING,
     cap_density: float | None = None,
-    items: Callable[[Discretisation, BellowShape], Sequence[Item]] | None = None,
+    items: Callable[[Discretisation, BendingShape], Sequence[Item]] | None = None,
     arc: bool = True,
 ) -> BendingModel:
     """Mesh the actuator and put its model together.
@@ -145,20 +142,29 @@ def bending_model(
 
 
 def bending_model_on(
-    body: BendingBellowMesh | TetrahedralBellowMesh,
+    body: BendingBody,
     material: MaterialSpec,
     *,
+    layer: Layer | None = None,
     mixed: bool = True,
     order: int | None = None,
     acceleration: tuple[float, float, float] = HANGING,
     cap_density: float | None = None,
-    items: Callable[[Discretisation, BellowShape], Sequence[Item]] | None = None,
+    items: Callable[[Discretisation, BendingShape], Sequence[Item]] | None = None,
     arc: bool = True,
 ) -> BendingModel:
-    """The same on a mesh that is there already; `mixed` and `order` as `discretise` takes them."""
+    """The same on a mesh that is there already, where some elements may be of another material.
+
+    `mixed` and `order` as `discretise` takes them.
+    """
     d = discretise(body.mesh, mixed=mixed, order=order)
     density = material.density.value
-    soft = Solid(d, *mixed_energies(material))
+    others = np.zeros(0, dtype=np.int64) if layer is None else layer.elements
+    rest = np.setdiff1d(np.arange(len(d.connectivity)), others)
+    soft = Solid(d, *mixed_energies(material), elements=rest if len(others) else None)
+    solids = [soft]
+    if layer is not None:
+        solids.append(Solid(d, layer.distortion, layer.volume, elements=others))
     shape = body.shape
     weight = shape.cap_mass(density if cap_density is None else cap_density) / 2
     cap = d.nodes_on("cap")
@@ -171,19 +177,20 @@ def bending_model_on(
     )
     model = Model(
         d,
-        [soft],
+        solids,
         supports=[
             Support.of(d, d.nodes_on("clamped"), (0, 1, 2)),
             Support.of(d, d.nodes_on("symmetry"), (1,)),
         ],
         surface=PressureSurface(d, d.facets_on("cavity")),
-        dead_load=gravity(soft, density, np.array(acceleration)),
+        dead_load=sum(
+            (gravity(solid, density, np.array(acceleration)) for solid in solids),
+            start=np.zeros(d.size),
+        ),
         bodies=[end],
         items=items(d, shape) if items is not None else (),
-        coordinates=Bending(
-            d, end, -shape.wall, shape.effective_length + shape.wall, height=shape.underside
-        )
+        coordinates=Bending(d, end, shape.start, shape.end, height=shape.underside)
         if arc
         else None,
     )
-    return BendingModel(model, soft, shape, body.bottom_far_edge, density, acceleration)
+    return BendingModel(model, soft, shape, density, acceleration)

@@ -1,4 +1,4 @@
-"""Blocked force of the bending bellow by finite elements: a rigid stop under the hanging tip.
+"""Blocked force of an actuator that bends by finite elements: a rigid stop under the hanging tip.
 
 The stop is the toolbox's (Yao, He and Maiolino): a rigid, frictionless plane facing up, where the
 far lower edge of the *undeformed* end cap just touches it, so that the actuator is held straight
@@ -12,16 +12,17 @@ measures tells by how much.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.mechanics.bellow import BellowShape
 from rig.mechanics.fe import Discretisation, Model, Options, Solution
-from rig.mechanics.mesh.bellow_bending import BendingResolution
-from rig.mechanics.simulate.bending import HANGING, BendingModel, bending_model
-from rig.spec.actuator import BellowBendingGeometry
+from rig.mechanics.fe.model import Item
+from rig.mechanics.simulate.bending import BendingModel
+from rig.mechanics.simulate.shape import BendingShape
 from rig.spec.material import MaterialSpec
 
 Array = NDArray[np.float64]
@@ -67,31 +68,37 @@ class BlockedBendingModel:
         }
 
 
-def blocked_bending_model(
-    geometry: BellowBendingGeometry,
-    material: MaterialSpec,
-    *,
-    resolution: BendingResolution | None = None,
-    acceleration: tuple[float, float, float] = HANGING,
-    cap_density: float | None = None,
-) -> BlockedBendingModel:
-    """`bending_model` with the stop under its tip; arguments and errors are the same."""
-    stops: list[TipStop] = []
+class BuildBending(Protocol):
+    """What puts the model of a geometry and a material together, as `bending_model` does."""
 
-    def stop(discretisation: Discretisation, shape: BellowShape) -> tuple[TipStop]:
-        stops.append(TipStop(discretisation, shape))
-        return (stops[0],)
+    def __call__(
+        self,
+        geometry: Any,
+        material: MaterialSpec,
+        /,
+        *,
+        items: Callable[[Discretisation, BendingShape], Sequence[Item]],
+        arc: bool,
+    ) -> BendingModel:
+        """The model with `items`, whose steps follow the cap's rotation if `arc` says so."""
+        ...
 
-    bending = bending_model(
-        geometry,
-        material,
-        resolution=resolution,
-        acceleration=acceleration,
-        cap_density=cap_density,
-        items=stop,
-        arc=False,
-    )
-    return BlockedBendingModel(bending, stops[0])
+
+@dataclass(frozen=True)
+class Blocked:
+    """Puts the stop under the tip of what `build` makes; arguments and errors are the same."""
+
+    build: BuildBending
+
+    def __call__(self, geometry: Any, material: MaterialSpec, /) -> BlockedBendingModel:
+        """The model with its stop."""
+        stops: list[TipStop] = []
+
+        def stop(discretisation: Discretisation, shape: BendingShape) -> tuple[TipStop]:
+            stops.append(TipStop(discretisation, shape))
+            return (stops[0],)
+
+        return BlockedBendingModel(self.build(geometry, material, items=stop, arc=False), stops[0])
 
 
 class TipStop:
@@ -109,7 +116,7 @@ class TipStop:
     def __init__(
         self,
         discretisation: Discretisation,
-        shape: BellowShape,
+        shape: BendingShape,
         stiffness: float = STOP_STIFFNESS,
     ) -> None:
         """Under the cap's undeformed edge; `stiffness` in N/m replaces rigidity."""
@@ -143,5 +150,5 @@ def _clearance(bending: BendingModel, x: Array) -> float:
     below = d.nodes_at(z=shape.underside)
     here = d.nodes[below] + x[3 * below[:, None] + np.arange(3)]
     away = np.hypot(here[:, 0] - shape.tip, here[:, 1])
-    on_disc = here[away < 2.5 * shape.average_radius]
+    on_disc = here[away < 2 * shape.half_width]
     return float(np.min(on_disc[:, 2], initial=np.inf) - shape.underside)

@@ -9,9 +9,15 @@ from typing import Any
 
 from rig.mechanics.fe import Options
 from rig.mechanics.mesh.bellow_bending import BendingResolution
+from rig.mechanics.mesh.chamber_row import RowResolution
 from rig.mechanics.simulate.axisymmetric import axisymmetric_model
 from rig.mechanics.simulate.bending import FREE_OPTIONS, bending_model
-from rig.mechanics.simulate.blocked import BLOCKED_OPTIONS, blocked_bending_model
+from rig.mechanics.simulate.blocked import BLOCKED_OPTIONS, Blocked
+from rig.mechanics.simulate.chambers import (
+    multi_chamber_bending_model,
+    multi_chamber_linear_model,
+    rectangular_bellow_model,
+)
 from rig.mechanics.simulate.gripper import finger_model, grip_model
 from rig.mechanics.simulate.inflation import ActuatorModel
 from rig.mechanics.simulate.joint import joint_model
@@ -45,28 +51,41 @@ class Family:
     family that no bench measures yet."""
 
 
+def _bending(build: Any, resolution: object) -> Meshing:
+    """Free and blocked models of what `build` makes at a resolution."""
+    at_resolution = partial(build, resolution=resolution)
+    return Meshing(at_resolution, Blocked(at_resolution), FREE_OPTIONS, BLOCKED_OPTIONS)
+
+
 _BENDING = BendingResolution(wall=1)
 """Half the time of two elements through the wall, for 0.24 % of the angle at 10 kPa (1 % at 2 kPa):
 docs/theory/finite-elements.md, "Refinement and speed"."""
 _COARSE_BENDING = BendingResolution(wall=1, crown=4)
+
+_BELLOWS = RowResolution(along=2.5e-3, across=5e-3)
+"""0.3 % of one bellow's angle from a mesh of three times as many: docs/validation/chambers.md."""
+_COARSE_BELLOWS = RowResolution(along=5e-3, across=7e-3)
+_BLOCK = RowResolution(along=3.6e-3, across=2.4e-3)
+_COARSE_BLOCK = RowResolution(along=3.6e-3, across=3.6e-3)
 
 FAMILIES: dict[str, Family] = {
     "bellow-axisymmetric": Family(model=Meshing(axisymmetric_model)),
     "bellow-gripper": Family(model=Meshing(finger_model, grip_model)),
     "bellow-joint": Family(model=Meshing(joint_model)),
     "bellow-bending": Family(
-        model=Meshing(
-            partial(bending_model, resolution=_BENDING),
-            partial(blocked_bending_model, resolution=_BENDING),
-            FREE_OPTIONS,
-            BLOCKED_OPTIONS,
-        ),
-        specimen=Meshing(
-            partial(bending_model, resolution=_COARSE_BENDING),
-            partial(blocked_bending_model, resolution=_COARSE_BENDING),
-            FREE_OPTIONS,
-            BLOCKED_OPTIONS,
-        ),
+        model=_bending(bending_model, _BENDING),
+        specimen=_bending(bending_model, _COARSE_BENDING),
+    ),
+    "bellow-rectangular": Family(
+        model=_bending(rectangular_bellow_model, _BELLOWS),
+        specimen=_bending(rectangular_bellow_model, _COARSE_BELLOWS),
+    ),
+    "multi-chamber-bending": Family(
+        model=_bending(multi_chamber_bending_model, _BLOCK),
+        specimen=_bending(multi_chamber_bending_model, _COARSE_BLOCK),
+    ),
+    "multi-chamber-linear": Family(
+        model=Meshing(partial(multi_chamber_linear_model, resolution=_BLOCK))
     ),
 }
 """Families that have a finite element model, by name."""

@@ -149,6 +149,7 @@ def _entry_of(
         "motion": np.array([s.motion for s in states]),
         "shift": np.array([[p.shift for p in s.poses] for s in states]),
         "rotation": np.array([[p.rotation for p in s.poses] for s in states]),
+        "turn": np.array([[p.angles for p in s.poses] for s in states]),
         **{
             f"{_MEASURE}{name}": np.array([row[name] for row in measured])
             for name in (measured[0] if measured else ())
@@ -198,8 +199,10 @@ def _solutions(entry: Entry) -> tuple[Solution, ...]:
                     for i in solids
                 ),
                 poses=tuple(
-                    Pose(shift, rotation)
-                    for shift, rotation in zip(entry["shift"][k], entry["rotation"][k], strict=True)
+                    Pose(*placed)
+                    for placed in zip(
+                        *(entry[name][k] for name in ("shift", "rotation", "turn")), strict=True
+                    )
                 ),
                 pressure=float(entry["pressure"][k]),
                 dead=float(entry["dead"][k]),

@@ -1,0 +1,114 @@
+"""The 25 underwater bellows of Yin et al., Section III-A, and refinement of one bellow.
+
+Answers are kept in the user's cache: a second run only prints.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+
+from rig.mechanics.chambers import ChamberRow
+from rig.mechanics.fe import Point, follow
+from rig.mechanics.job import Job
+from rig.mechanics.kinematics import BellowRow
+from rig.mechanics.mesh.chamber_row import RowResolution
+from rig.mechanics.simulate.bending import FREE_OPTIONS, BendingModel
+from rig.mechanics.simulate.chambers import rectangular_bellow_model
+from rig.mechanics.simulate.prediction import free_inflation
+from rig.mechanics.store import FolderStore
+from rig.spec.chambers import BellowRectangularGeometry
+from rig.spec.loading import load_actuator
+from rig.spec.workspace import Workspace
+
+ACTUATOR = Path("models/actuators/bellow-rectangular.yaml")
+LENGTHS_MM = (1, 2, 3, 4, 5)
+MESHES = (
+    RowResolution(2.5e-3, 5e-3, 1),
+    RowResolution(5e-3, 7e-3, 2),
+    RowResolution(2.5e-3, 5e-3, 2),
+    RowResolution(2.5e-3, 3.5e-3, 3),
+    RowResolution(1.7e-3, 2e-3, 3),
+)
+PRESSURES = (5e3, 50e3, 100e3, 200e3)
+
+
+def main() -> None:
+    """Print both tables."""
+    refinement()
+    designs()
+
+
+def refinement() -> None:
+    """One bellow between two spacers, at some pressures."""
+    actuator = load_actuator(ACTUATOR)
+    material = Workspace.find().material(actuator.material)
+    one = actuator.geometry.model_copy(update={"bellow_number": 1})
+    print(
+        "along  across  through  elements   " + "  ".join(f"{p / 1e3:5.0f} kPa" for p in PRESSURES)
+    )
+    for mesh in MESHES:
+        start = time.process_time()
+        model = rectangular_bellow_model(one, material, resolution=mesh)
+        found = follow(model.model, [Point(p) for p in PRESSURES], options=FREE_OPTIONS)
+        angles = "  ".join(f"{np.degrees(model.angle(s.state)):9.3f}" for s in found.solutions)
+        print(
+            f"{1e3 * mesh.along:5.1f}  {1e3 * mesh.across:6.1f}  {mesh.through:7d}  "
+            f"{len(model.model.discretisation.connectivity):8d}  {angles} deg, "
+            f"{time.process_time() - start:.1f} s of processor"
+        )
+
+
+def designs() -> None:
+    """Length, radius, angle, extension and volume of every design at 200 kPa."""
+    actuator = load_actuator(ACTUATOR)
+    material = Workspace.find().material(actuator.material)
+    job = Job(FolderStore.of_user())
+    print(
+        "bellow  spacer  length  radius   angle  extension  volume  per mL  R2 volume  R2 pressure"
+    )
+    for bellow in LENGTHS_MM:
+        for spacer in LENGTHS_MM:
+            lengths = {"bellow_length": bellow / 1e3, "spacer_length": spacer / 1e3}
+            geometry = actuator.geometry.model_copy(update=lengths)
+            design = actuator.model_copy(update={"geometry": geometry})
+            question = free_inflation(design, material)
+            curves = question.curves(actuator.limits.pressure, job)
+            model, solutions = question.solutions(actuator.limits.pressure, job)
+            row = BellowRow.of(geometry)
+            extension = row.number * row.extension(curves.measured["angle"])
+            volume = 1e6 * (curves.measured["volume"] - curves.measured["volume"][0])
+            radius = inner_radius(geometry, model, solutions[-1].state.x)
+            slope = extension @ volume / (volume @ volume)
+            total = ChamberRow.of(geometry).tip + geometry.end_length - geometry.wall_thickness
+            print(
+                f"{bellow:6d}  {spacer:6d}  {1e3 * total:6.1f}  {1e3 * radius:6.2f}  "
+                f"{np.degrees(curves.measured['angle'][-1]):6.1f}  {1e3 * extension[-1]:9.2f}  "
+                f"{volume[-1]:6.3f}  {1e3 * slope:6.2f}  {linearity(volume, extension):9.4f}  "
+                f"{linearity(curves.pressure, extension):11.4f}"
+                + (f"  ends at {curves.pressure[-1] / 1e3:.0f} kPa" if curves.stopped else "")
+            )
+
+
+def inner_radius(geometry: BellowRectangularGeometry, model: BendingModel, x: np.ndarray) -> float:
+    """Of the circle through the strain-limiting layer below the bellows, in m."""
+    d = model.model.discretisation
+    line = d.nodes_at(y=0.0, z=0.0)
+    first = geometry.wall_thickness + geometry.spacer_length
+    last = ChamberRow.of(geometry).end - first
+    line = line[(d.nodes[line, 0] > first) & (d.nodes[line, 0] < last)]
+    moved = d.nodes[line] + x[3 * line[:, None] + np.arange(3)]
+    # x^2 + z^2 = 2 a x + 2 b z + c
+    terms = np.column_stack((2 * moved[:, 0], 2 * moved[:, 2], np.ones(len(moved))))
+    a, b, c = np.linalg.lstsq(terms, moved[:, 0] ** 2 + moved[:, 2] ** 2, rcond=None)[0]
+    return float(np.sqrt(c + a**2 + b**2))
+
+
+def linearity(cause: np.ndarray, effect: np.ndarray) -> float:
+    """Coefficient of determination of a straight line through the origin."""
+    slope = cause @ effect / (cause @ cause)
+    rest = effect - slope * cause
+    spread = effect - effect.mean()
+    return float(1 - rest @ rest / (spread @ spread))
