@@ -42,7 +42,7 @@ class Liquid(SpecModel):
     bulk_modulus: Pressure = Field(2.18e9, gt=0, description="without bubbles")  # the same
     entrained_air: Ratio = Field(
         0.005, gt=0, lt=1, description="share of the volume that is bubbles, at ambient pressure"
-    )  # a guess; Merritt, Hydraulic Control Systems (1967), finds 0 to 1 % in practice
+    )  # a guess: filled by hand
     solubility: Ratio = Field(
         0.0200, ge=0, description="volume of air that dissolves in a volume of it, at any pressure"
     )  # Bunsen coefficient 0.0187 of air in water at 20 degC, at the gas's own temperature

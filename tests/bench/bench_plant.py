@@ -6,7 +6,7 @@ Target: firmware and plant together 300 times real time on one core, in processo
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from rig.board.native import NativeBoard
@@ -53,9 +53,9 @@ def times_real_time(bench_name: str) -> tuple[float, float, float]:
     link.command("set_pressure", 10.0)
     link.wait(8.0)
 
-    def rate(advance: object, seconds: float) -> float:
+    def rate(advance: Callable[[float], object], seconds: float) -> float:
         began = time.process_time()
-        advance(seconds)  # type: ignore[operator]
+        advance(seconds)
         return seconds / (time.process_time() - began)
 
     def hold(seconds: float) -> None:
@@ -66,7 +66,7 @@ def times_real_time(bench_name: str) -> tuple[float, float, float]:
     # without the host: within the second that the board waits for it
     boards = []
     for _ in range(10):
-        boards.append(rate(lambda seconds: bench.board.read(seconds), 0.8))
+        boards.append(rate(bench.board.read, 0.8))
         link.wait(0.3)
     alone = rate(lambda seconds: bench.plant.run(round(1000 * seconds)), 20.0)
     return alone, sorted(boards)[len(boards) // 2], linked

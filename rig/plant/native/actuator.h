@@ -5,8 +5,8 @@
 //   play operators (hysteresis: Prandtl and Ishlinskii),
 //   Mullins softening: on the way back and up again to the highest pressure M ever, the wall takes
 //     less pressure than its virgin response w, p = w eta, eta = 1 - d erf((1 - (w/M)^2) / beta)
-//     (Ogden and Roxburgh, Proc. R. Soc. A 455 (1999) 2861, with W as w^2; d comes with load cycles
-//     N as 1 - exp(-N / N0)),
+//     (Ogden and Roxburgh, Proc. R. Soc. A 455 (1999) 2861, with w^2 for the energy and its highest
+//     for their constant m; that d comes with load cycles N as 1 - exp(-N / N0) is ours),
 //   ageing: (1 + a log10(1 + N)) as much shape after N cycles,
 //   creep: a Prony series of shares g and times tau; at a held shape the same terms are the
 //     relaxation of stress, with times (1 - g) tau for one term,

@@ -2,7 +2,7 @@
 //
 // Motor: follows every pulse while the torque it needs is within the pull-out torque of its speed,
 // T = T0 / sqrt(1 + (f / fc)^2), the current that the winding's inductance lets through (Acarnley,
-// Stepping Motors, 4th ed., chapter 5). Otherwise it stalls until the pulses are slow enough to
+// Stepping Motors, 4th ed., on high-speed operation). Otherwise it stalls until the pulses are slow enough to
 // start it, and comes back into step a whole number of electrical cycles (four full steps) late.
 // Plunger: the nut pushes and pulls it through rod and play (backlash); its seal sticks up to the
 // breakaway force and slides with Coulomb and viscous friction, without mass.

@@ -5,7 +5,7 @@
 // wall, which has ambient temperature, with one time constant.
 // Liquid: V = Vl (1 - (p - p0) / K) + n R T / p, isothermal, as the liquid holds the bubbles'
 // temperature; Henry's law says how much air would be in solution, and it comes and goes with one
-// time constant. (Merritt, Hydraulic Control Systems, 1967, section 2.4: effective bulk modulus.)
+// time constant. (Merritt, Hydraulic Control Systems, 1967: effective bulk modulus.)
 #pragma once
 
 #include <algorithm>
