@@ -30,6 +30,7 @@ FILTER_TICKS = 4
 """Of the transducer's mean (transducer.h)."""
 KNOWN_DELAY_S = REPORT_AHEAD_S + FILTER_TICKS * TICK_S / 2
 """From reported plunger to reported pressure, were the pneumatics at once."""
+GAIN_KNOWN_TO = 10 ** (2 / 20)
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,8 @@ class Margins:
     gain_db: float
     phase_deg: float
     delay_s: float
-    """Additional delay at which the loop becomes unstable."""
+    """Additional delay at which the loop becomes unstable, its gain known to 2 dB: where |L| is
+    flat a little gain moves the crossover far."""
     crossover: float
     """rad/s at which the loop gain is one."""
     phase_crossover: float
@@ -121,6 +123,13 @@ def loop(model: LevelModel, gains: Gains, tick_s: float = TICK_S) -> Any:
     return plant(model, tick_s) * controller(gains, tick_s)
 
 
+def _delay_margin(response: Complex, omega: Array) -> float:
+    """Least delay that turns the loop to -1 at any frequency where its gain may be one."""
+    near = np.abs(np.log(np.abs(response))) <= math.log(GAIN_KNOWN_TO)
+    lead = np.pi + np.unwrap(np.angle(response))
+    return float(np.min(lead[near] / omega[near]))
+
+
 def margins(model: LevelModel, gains: Gains, tick_s: float = TICK_S) -> Margins:
     """Gain, phase and delay margin of a loop that integrates, by python-control.
 
@@ -135,7 +144,7 @@ def margins(model: LevelModel, gains: Gains, tick_s: float = TICK_S) -> Margins:
     return Margins(
         gain_db=20 * math.log10(gain),
         phase_deg=float(phase),
-        delay_s=math.radians(phase) / crossover,
+        delay_s=_delay_margin(response, omega),
         crossover=float(crossover),
         phase_crossover=float(phase_crossover),
         peak_sensitivity=float(np.max(1 / np.abs(1 + response))),
