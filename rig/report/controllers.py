@@ -8,7 +8,8 @@ from pathlib import Path
 from rig.control.family import Family
 from rig.experiment.controllers import Outcome
 from rig.report.charts import COLOURS, TALL, Chart, finished, legend_below, new_figure, styled
-from rig.report.sheet import Section, Sheet, Table, write_sheet
+from rig.report.sheet import Sheet, write_sheet
+from rig.report.sheet_parts import Section, Table
 
 COLUMNS = (
     ("controller", ""),
