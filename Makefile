@@ -9,7 +9,7 @@ NATIVE := $(wildcard firmware/host/*.* firmware/rig_mega/src/core/*.* rig/plant/
 # the matrices here are small: a second BLAS thread only fights with the second test process
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: demo test setup check bench slow clean
+.PHONY: demo test setup check docs bench slow clean
 
 demo: $(READY)  ## characterise the default actuator on the virtual bench
 	$(BIN)/rig characterise --actuator models/actuators/bellow-bending.yaml
@@ -30,6 +30,9 @@ $(READY): pyproject.toml setup.py requirements.lock tools/setup.sh $(NATIVE)
 
 bench: $(READY)  ## speed figures, printed as tables
 	$(BIN)/python -m tests.bench
+
+docs: $(READY)  ## the documentation, into build/site
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 
 slow: $(READY)  ## the checks that take minutes
 	$(BIN)/python -m pytest -m slow

@@ -12,24 +12,35 @@ import os
 import pkgutil
 import sys
 import textwrap
+from typing import TYPE_CHECKING
 
 import rig.cli
 from rig.errors import RigError
+
+if TYPE_CHECKING:
+    import typer
 
 NOT_VERBS = {"app", "main"}
 INTERRUPTED = 130
 PIPE_CLOSED = 141
 
 
-def _run(arguments: list[str]) -> None:
-    """Import the verbs and run one of them; typer is imported here so that Ctrl-C is caught."""
-    from rig.cli.app import ClosedPipeError, InterruptionError, app
+def application() -> typer.Typer:
+    """The typer application with every verb; typer is imported here so that Ctrl-C is caught."""
+    from rig.cli.app import app
 
     for module in pkgutil.iter_modules(rig.cli.__path__):
         if module.name not in NOT_VERBS and not module.name.startswith("_"):
             importlib.import_module(f"rig.cli.{module.name}")
+    return app
+
+
+def _run(arguments: list[str]) -> None:
+    """Run one of the verbs."""
+    from rig.cli.app import ClosedPipeError, InterruptionError
+
     try:
-        app(args=arguments, prog_name="rig")
+        application()(args=arguments, prog_name="rig")
     except InterruptionError:
         raise KeyboardInterrupt from None
     except ClosedPipeError:

@@ -9,6 +9,7 @@ import sys
 import pytest
 import typer
 
+from rig import __version__ as version
 from rig.cli import main as main_module
 
 from .conftest import ROOT, Command
@@ -73,3 +74,13 @@ def test_a_terminal_that_knows_only_ascii_gets_question_marks() -> None:
         [sys.executable, "-c", program], cwd=ROOT, env=environment, capture_output=True, check=False
     )
     assert (done.returncode, done.stdout.strip(), done.stderr) == (0, b"5 ? 1", b"")
+
+
+def test_the_version_names_the_commit(rig: Command) -> None:
+    outcome = rig("--version")
+    assert outcome.code == 0
+    checkout = subprocess.run(
+        ["git", "rev-parse", "HEAD"], cwd=ROOT, capture_output=True, text=True
+    )
+    known = f"commit {checkout.stdout[:12]}" if checkout.returncode == 0 else "commit unknown"
+    assert outcome.out == f"rig {version} ({known})\n"

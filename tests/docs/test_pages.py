@@ -1,0 +1,117 @@
+"""The site's generated pages hold what the code says; those written by hand leave nothing out."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from rig.link.faults import HINTS
+from rig.spec.schema import schemas
+from tools.sitegen.commands import commands_page
+from tools.sitegen.pins import HEADER, PinError, read_pins, wiring_diagram, wiring_table
+from tools.sitegen.plots import curves, read_table
+from tools.sitegen.specs import spec_pages
+
+ROOT = Path(__file__).resolve().parents[2]
+PINS = (ROOT / HEADER).read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def commands() -> str:
+    return commands_page()
+
+
+def test_every_module_of_a_verb_has_its_command_on_the_page(commands: str) -> None:
+    modules = {path.stem for path in (ROOT / "rig/cli").glob("[a-z]*.py")} - {"app", "main"}
+    verbs = {name.replace("_", "-") for name in modules if not name.startswith("calibrate_")}
+    for verb in verbs:
+        assert f"## `rig {verb}`" in commands
+    for name in modules:
+        if name.startswith("calibrate_"):
+            assert f"### `rig calibrate {name.removeprefix('calibrate_')}`" in commands
+
+
+def test_options_stand_with_their_help_and_default(commands: str) -> None:
+    predict = commands.split("## `rig predict`")[1].split("\n## ")[0]
+    assert "* `--actuator" in predict
+    assert "[required]" in predict
+    assert "[default: pressure]" in predict
+
+
+def test_every_field_of_every_kind_of_file_is_in_its_table() -> None:
+    pages = spec_pages()
+    assert set(pages) == set(schemas())
+    for kind, schema in schemas().items():
+        for model in (schema, *schema.get("$defs", {}).values()):
+            for name in model.get("properties", {}):
+                assert f"| `{name}` |" in pages[kind], (kind, name)
+
+
+def test_a_field_shows_bounds_default_and_unit() -> None:
+    (row,) = [
+        line
+        for line in spec_pages()["actuator"].splitlines()
+        if line.startswith("| `radius_ratio`")
+    ]
+    assert "above 0" in row
+    assert "below 1" in row
+    assert "plain number" in row
+    (row,) = [
+        line
+        for line in spec_pages()["actuator"].splitlines()
+        if line.startswith("| `effective_length`")
+    ]
+    assert "`66 mm`" in row
+
+
+def test_models_are_linked_to_a_section_that_is_there() -> None:
+    for kind, page in spec_pages().items():
+        sections = {name.lower() for name in re.findall(r"^## (\w+)$", page, re.MULTILINE)}
+        assert set(re.findall(r"\]\(#(\w+)\)", page)) <= sections, kind
+
+
+def test_the_wiring_is_that_of_the_header_and_of_the_firmwares_manual() -> None:
+    pins = read_pins(PINS)
+    manual = (ROOT / "firmware/README.md").read_text(encoding="utf-8")
+    section = manual.split("## Pins of the Mega")[1].split("\n## ")[0]
+    rows = "".join(line.split("|")[1] for line in section.splitlines() if line.startswith("|"))
+    assert {pin.name for pin in pins} == set(re.findall(r"[AD]\d+", rows))
+    for pin in pins:
+        assert f"| {pin.name} | {pin.port} | {pin.wire.device} |" in wiring_table(pins)
+        assert f">{pin.name}</text>" in wiring_diagram(pins)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("_BV(PA0);         // D22", "_BV(PA0);         // D23"),
+        ("_BV(PA0);         // D22", "_BV(PA7);         // D22"),
+        ("constexpr uint8_t kStep", "constexpr uint8_t kStride"),
+        (
+            "constexpr uint8_t kStep",
+            "constexpr uint8_t kBrake = _BV(PB0);\nconstexpr uint8_t kStep",
+        ),
+    ],
+)
+def test_a_header_that_was_changed_without_the_wiring_is_refused(old: str, new: str) -> None:
+    assert old in PINS
+    with pytest.raises(PinError):
+        read_pins(PINS.replace(old, new))
+
+
+@pytest.mark.parametrize("page", ["docs/troubleshooting.md", "docs/firmware/faults.md"])
+def test_every_fault_of_the_board_has_an_entry(page: str) -> None:
+    """The hints hold every fault of the schema: tests/link/test_client.py."""
+    entries = re.findall(r"^\| `(\w+)` \|", (ROOT / page).read_text("utf-8"), re.MULTILINE)
+    assert sorted(entry for entry in entries if entry in HINTS) == sorted(HINTS)
+
+
+def test_plots_hold_the_numbers_of_the_pages_table() -> None:
+    page = "# P\n\n## T: a\n\n| x | y | z |\n| --- | --- | --- |\n| 1 | 2 | -3 |\n| RMSE | | 4 |\n"
+    table = read_table(page, "T")
+    assert table == {"x": [1.0], "y": [2.0], "z": [-3.0]}
+    assert curves(table, "a (b)", "c").startswith("<svg")
+    with pytest.raises(ValueError, match="no table"):
+        read_table(page, "U")
