@@ -19,6 +19,9 @@ SAMPLE_MESSAGES = 10
 """Pressure messages, 20 ms apart, to a sample: their noise averages out, and samples are white."""
 LEAST_SAMPLES = 25
 """A closing shorter than this (5 s) tells too little to be put on record."""
+MOST_TRAVEL = 200e-6
+"""m3 of strokes, there and back, over which the errors of the model do not yet add up: after
+hundreds of cycles the estimated volume was 8 mL off, seventeen times its uncertainty."""
 LEAK_PRESSURE = 10e3
 """Pa gauge at which leaks are told, as in bench specs."""
 LINE_U = 0.1
@@ -45,6 +48,7 @@ class GasWatch:
     _pending: list[Sample] = field(default_factory=list)
     _last: Sample | None = None
     _began_s: float = 0.0
+    _travel: float = 0.0
     _nis: list[float] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -86,10 +90,12 @@ class GasWatch:
         if self._last is None:
             self._monitor.close(plunger, pressure)
             self._began_s = time_s
+            self._travel = 0.0
             self._nis.clear()
         else:
             innovation, alarm = self._monitor.step(time_s - self._last[0], plunger, pressure)
             self._nis.append(innovation.nis)
+            self._travel += abs(plunger - self._last[1])
             if alarm is not None:
                 self.warn(time_s, alarm)
         self._last = sample
@@ -99,7 +105,8 @@ class GasWatch:
         if self._last is None:
             return
         estimate = self._monitor.estimate
-        if len(self._nis) >= LEAST_SAMPLES and estimate.leak is not None:
+        enough = len(self._nis) >= LEAST_SAMPLES and self._travel <= MOST_TRAVEL
+        if enough and estimate.leak is not None:
             self.note(
                 GasDocument(
                     from_s=self._began_s,

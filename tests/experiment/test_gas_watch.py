@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from rig.board.virtual import VirtualBench
 from rig.experiment.bench import Nobody
-from rig.experiment.gas_watch import LEAK_PRESSURE
+from rig.experiment.gas_watch import LEAK_PRESSURE, GasWatch, gas_monitor
+from rig.link.client import Message
 from rig.plant.plant import Faults
+from rig.record.documents import GasDocument
 from rig.report.build import build_report
 
 from .conftest import SHORT, VirtualRun, make_request, take
@@ -26,6 +29,24 @@ class Listens(Nobody):
 
     def warned(self, text: str) -> None:
         self.heard.append(text)
+
+
+@pytest.mark.parametrize(("cycles", "told"), [(1, True), (60, False)])
+def test_after_many_strokes_the_estimate_is_not_put_on_record(cycles: int, told: bool) -> None:
+    request = make_request()
+    notes: list[GasDocument] = []
+    watch = GasWatch(lambda: gas_monitor(request), lambda *_: None, notes.append)
+    period_s, times = 10.0, np.arange(0.0, cycles * 10.0, 0.02)
+    plunger_ml = 1.5 + 1.0 * (1 - np.cos(2 * np.pi * times / period_s))
+    for index, (time_s, ml) in enumerate(zip(times, plunger_ml, strict=True)):
+        kpa = 101.325 * (76.4 / (76.4 - (ml - 1.5)) - 1)
+        pressure = {"pressure_kpa": kpa, "plunger_ml": ml, "plausible": 1}
+        messages = [Message(float(time_s), "PRESSURE", pressure)]
+        if index % 5 == 0:
+            messages.append(Message(float(time_s), "HEARTBEAT", {"valve_open": 0}))
+        watch([], messages)
+    watch([], [Message(float(times[-1]), "HEARTBEAT", {"valve_open": 1})])
+    assert bool(notes) == told
 
 
 def leaking(ml_s: float) -> object:
