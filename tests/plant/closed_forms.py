@@ -321,6 +321,25 @@ def subsonic() -> Comparison:
     return Comparison(valve_flow(10e3, 0.3), SONIC_MOLES * (AMBIENT + 10e3) * phi, 1e-5)
 
 
+@case("valve, ISO 6358: flow into a vessel cooled by expansion, mol/s")
+def drawn_in() -> Comparison:
+    plant = plugged(
+        dead_volume=VAST,
+        syringe_volume=VAST,
+        start_volume=VAST / 2,
+        volume_per_step=1.0,
+        heat_exchange_time=NEVER,
+    )
+    plant.do_step(0.0, 1e-3, pulses=-0.1 * VAST)
+    start = plant.truth()
+    assert start.temperature < TEMPERATURE - 5
+    plant.run(100, valve_open=True)
+    # upstream is the air of the room, whatever the vessel's temperature
+    ratio = (AMBIENT + start.gauge_pressure) / AMBIENT
+    phi = np.sqrt(1 - ((ratio - 0.3) / 0.7) ** 2)
+    return Comparison(-plant.truth().moles_out / 0.1, SONIC_MOLES * AMBIENT * phi, 1e-5)
+
+
 @case("adiabatic emptying to ambient, temperature fall, K")
 def emptying() -> Comparison:
     plant = plugged(heat_exchange_time=1e-4)
