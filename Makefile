@@ -32,7 +32,7 @@ bench: $(READY)  ## speed figures, printed as tables
 	$(BIN)/python -m tests.bench
 
 docs: $(READY)  ## the documentation, into build/site
-	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
 slow: $(READY)  ## the checks that take minutes
 	$(BIN)/python -m pytest -m slow

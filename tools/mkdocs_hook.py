@@ -17,12 +17,22 @@ MATH_FENCE = "math"
 
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
-    """Let ```math fences, which code hosts know too, become MathML."""
+    """Let ```math fences, which code hosts know too, become MathML; fill the nav's folders."""
     options = config.mdx_configs.setdefault("pymdownx.superfences", {})
     options.setdefault("custom_fences", []).append(
         {"name": MATH_FENCE, "class": MATH_FENCE, "format": equation}
     )
+    config.nav = [_filled(entry, Path(config.docs_dir)) for entry in config.nav or []]
     return config
+
+
+def _filled(entry: dict[str, Any], docs: Path) -> dict[str, Any]:
+    """The entry; where it names a folder, with that folder's pages, `index.md` before the others."""
+    ((title, place),) = entry.items()
+    if not isinstance(place, str) or not place.endswith("/"):
+        return entry
+    pages = sorted((docs / place).glob("*.md"), key=lambda page: (page.stem != "index", page.stem))
+    return {title: [place + page.name for page in pages]}
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
