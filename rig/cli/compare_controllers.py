@@ -75,7 +75,7 @@ def compare_controllers(
     limits = {
         case.name: motor_limited_mae_kpa(case, stiffness, family.parameters)
         for case in CASES
-        if case.levels_kpa
+        if case.levels_kpa and case.is_as_identified
     }
     write_competition(out, family, outcomes, limits)
     if as_json:

@@ -62,6 +62,11 @@ class Case:
     leak_lasts_s: float | None = None
     """None: for good."""
 
+    @property
+    def is_as_identified(self) -> bool:
+        """Whether the plunger compresses the gas volume that the models were found for."""
+        return self.inward_ml == 0 and self.added_ml == 0
+
 
 def _stairs(levels: Sequence[float]) -> Callable[[float], float]:
     return lambda t: levels[min(int(t / HOLD_S), len(levels) - 1)]

@@ -10,8 +10,8 @@ from rig.control.loop import Gains
 from rig.control.lqg import LinearQuadraticGaussian
 from rig.control.tune import Wanted, tune
 from rig.experiment.controllers import (
+    CASES,
     HOLD_S,
-    STAIRS_KPA,
     Case,
     Controller,
     Outcome,
@@ -76,7 +76,11 @@ def test_what_the_motor_leaves_is_half_of_each_move() -> None:
     case = Case("one", lambda t: 8.0, HOLD_S, (8.0,))
     move_s = 8.0 / 8.0 + 8.0 / 40.0
     assert motor_limited_mae_kpa(case, 1.0, known) == pytest.approx(8.0 * move_s / 2 / HOLD_S)
-    assert len(STAIRS_KPA) == 7
+
+
+def test_only_with_the_identified_volume_does_the_model_tell_what_the_motor_leaves() -> None:
+    other = {case.name for case in CASES if not case.is_as_identified}
+    assert other == {"0 to 8 kPa, plunger in", "staircase, +15 mL", "staircase, +30 mL"}
 
 
 def test_the_regulator_in_the_host_rejects_a_lasting_disturbance() -> None:
