@@ -1,0 +1,1 @@
+"""Pages: what is shown, and which view model a press of a button asks."""
