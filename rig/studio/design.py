@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, Literal, get_args, get_origin
 
 from rig.mechanics.model import available_models
 from rig.report.build import write_text
@@ -44,20 +44,54 @@ class FormField:
     meaning: str
     unit: str
     """Of a bare number; empty for plain numbers and counts."""
+    default: str
+    choices: tuple[str, ...] = ()
+    """Words that it takes; empty if it is free."""
+    is_list: bool = False
+    """Whether its text is JSON."""
 
 
 def form_fields(family: str) -> tuple[FormField, ...]:
     """The parameters of a geometry family, in the order of its spec."""
-    return tuple(
-        FormField(
-            name=f"{GEOMETRY}.{name}",
-            label=name.replace("_", " "),
+    return tuple(_fields(FAMILIES[family], GEOMETRY))
+
+
+def _fields(model: type[SpecModel], inside: str) -> Iterator[FormField]:
+    for name, info in model.model_fields.items():
+        kind = info.annotation
+        if name == "family":
+            continue
+        if isinstance(kind, type) and issubclass(kind, SpecModel):
+            yield from _fields(kind, f"{inside}.{name}")
+            continue
+        unit = unit_of(info)
+        is_list = get_origin(kind) is tuple
+        default: Any = info.default
+        yield FormField(
+            name=f"{inside}.{name}",
+            label=f"{inside}.{name}".removeprefix(f"{GEOMETRY}.")
+            .replace(".", " ")
+            .replace("_", " "),
             meaning=info.description or "",
-            unit=unit.lab if (unit := unit_of(info)) is not None else "",
+            unit=unit.lab if unit is not None else "",
+            default=json.dumps(default)
+            if is_list
+            else str(default)
+            if unit is None
+            else unit.in_lab_units(default),
+            choices=get_args(kind) if get_origin(kind) is Literal else (),
+            is_list=is_list,
         )
-        for name, info in FAMILIES[family].model_fields.items()
-        if name != "family"
-    )
+
+
+def _tags(model: type[SpecModel]) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Where a family, or one inside of it, names itself."""
+    for name, info in model.model_fields.items():
+        kind = info.annotation
+        if name == "family":
+            yield (), str(get_args(kind)[0])
+        elif isinstance(kind, type) and issubclass(kind, SpecModel):
+            yield from (((name, *place), tag) for place, tag in _tags(kind))
 
 
 @dataclass(frozen=True)
@@ -95,11 +129,19 @@ class Draft:
             f"name: {_scalar(self.name)}",
             f"description: {_scalar(self.description)}",
             "geometry:",
-            f"  family: {self.family}",
         ]
+        sections: dict[tuple[str, ...], list[str]] = {
+            place: [f"family: {tag}"] for place, tag in _tags(FAMILIES[self.family])
+        }
         for item in form_fields(self.family):
-            key = item.name.removeprefix(f"{GEOMETRY}.")
-            lines.append(f"  {key}: {_scalar(self.values[item.name])}")
+            _, *place, key = item.name.split(".")
+            text = self.values[item.name]
+            value = _list(text) if item.is_list else _scalar(text)
+            sections.setdefault(tuple(place), []).append(f"{key}: {value}")
+        for where, entries in sections.items():
+            indent = "  " * (len(where) + 1)
+            lines += [f"{indent[2:]}{where[-1]}:"] if where else []
+            lines += [indent + entry for entry in entries]
         lines += [
             f"material: {_scalar(self.material)}",
             "limits:",
@@ -121,13 +163,14 @@ def blank(family: str, material: str) -> Draft:
 def draft_of(text: str, path: Path) -> Draft:
     """The form of a spec's text, its values as they are written; raises SpecError."""
     spec = parse(text, path, ActuatorSpec).spec
-    data = parse_tree(text, path).data
+    tree = parse_tree(text, path)
     family = spec.geometry.family
-    given = {f"{GEOMETRY}.{key}": str(value) for key, value in data[GEOMETRY].items()}
-    values = {name: given.get(name, default) for name, default in _defaults(family).items()} | {
-        LIMIT: str(data["limits"]["pressure"])
-    }
-    tolerances = data.get("tolerances") or {}
+    values = {LIMIT: str(tree.value(("limits", "pressure")))}
+    for item in form_fields(family):
+        value = tree.value(tuple(item.name.split(".")))
+        written = json.dumps(value) if item.is_list else str(value)
+        values[item.name] = item.default if value is None else written
+    tolerances = tree.data.get("tolerances") or {}
     return Draft(
         name=spec.name,
         family=family,
@@ -212,15 +255,16 @@ def save(checked: Checked, workspace: Workspace, *, replacing: bool = False) -> 
 
 
 def _defaults(family: str) -> dict[str, str]:
-    found: dict[str, str] = {}
-    for name, info in FAMILIES[family].model_fields.items():
-        if name != "family":
-            unit = unit_of(info)
-            default: Any = info.default
-            found[f"{GEOMETRY}.{name}"] = (
-                str(default) if unit is None else unit.in_lab_units(default)
-            )
-    return found
+    return {item.name: item.default for item in form_fields(family)}
+
+
+def _list(text: str) -> str:
+    """A list in the notation that YAML and JSON share; anything else stays text."""
+    try:
+        value = json.loads(text)
+    except (ValueError, RecursionError):
+        return _scalar(text)
+    return json.dumps(value) if isinstance(value, list) else _scalar(text)
 
 
 def _scalar(text: str) -> str:

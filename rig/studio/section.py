@@ -49,13 +49,14 @@ def _painted(solid: Solid, paint: Paint) -> Iterator[Outline]:
             for removed in solid.removed:
                 yield from _painted(removed, "hollow")
         case Prism():
-            yield Outline(_rectangle(solid), paint)
+            if (across := _rectangle(solid)) is not None:
+                yield Outline(across, paint)
         case Revolved():
             yield Outline(_mirrored(solid), paint)
 
 
-def _rectangle(solid: Prism) -> Array:
-    """A prism across y = 0: between its lowest and highest point there."""
+def _rectangle(solid: Prism) -> Array | None:
+    """A prism across y = 0, between its lowest and highest point there; None if it stays off."""
     section = np.array(solid.section)
     y, z = section.T
     following = np.roll(section, -1, axis=0)
@@ -63,6 +64,8 @@ def _rectangle(solid: Prism) -> Array:
     for (y0, z0), (y1, z1) in zip(section, following, strict=True):
         if y0 * y1 < 0:
             heights.append(float(z0 + (z1 - z0) * y0 / (y0 - y1)))
+    if not heights:
+        return None
     low, high = min(heights), max(heights)
     return np.array([[solid.start, low], [solid.end, low], [solid.end, high], [solid.start, high]])
 

@@ -102,16 +102,13 @@ def _write_stl(folder: Path, actuator: ActuatorSpec) -> None:
 
 
 def _write_deck(path: Path, actuator: ActuatorSpec, material: MaterialSpec) -> None:
-    from rig.mechanics.bellow import bending_geometry
+    from rig.mechanics.deck.build import deck_model
     from rig.mechanics.deck.elements import Program
     from rig.mechanics.deck.write import write_deck
-    from rig.mechanics.mesh.bellow_bending import mesh_bending_bellow
-    from rig.mechanics.simulate.bending import bending_model_on
 
-    geometry = bending_geometry(actuator, "The input deck")
     write_deck(
         path,
-        bending_model_on(mesh_bending_bellow(geometry), material),
+        deck_model(actuator, material),
         pressure=actuator.limits.pressure,
         program=Program.CALCULIX,
         title=actuator.name,

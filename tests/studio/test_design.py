@@ -164,8 +164,8 @@ def test_the_section_of_the_bellow_has_its_profile() -> None:
     assert found == pytest.approx(area, rel=2e-3)
 
 
-@pytest.mark.parametrize("name", ["bellow-bending", "bellow-axisymmetric", "bellow-joint"])
-def test_every_family_is_drawn(name: str) -> None:
+@pytest.mark.parametrize("name", LIBRARY.names("actuator"))
+def test_every_actuator_is_drawn(name: str) -> None:
     spec = LIBRARY.actuator(name)
     svg = section_svg(section_of(spec.geometry), "a <title>")
     assert svg.count("<polygon") == len(section_of(spec.geometry)) >= 2

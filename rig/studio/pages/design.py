@@ -202,7 +202,10 @@ class DesignPage:
         self._parameters.clear()
         with self._parameters:
             for item in form_fields(draft.family):
-                self._input(item.name, item.label, item.meaning, item.unit)
+                meaning = (
+                    f"{item.meaning}: {', '.join(item.choices)}" if item.choices else item.meaning
+                )
+                self._input(item.name, item.label, meaning, item.unit)
         self._inputs["name"].value = draft.name
         self._inputs["description"].value = draft.description
         for name, text in draft.values.items():
