@@ -17,6 +17,9 @@ Array = NDArray[np.float64]
 
 CONNECTOR_THICKNESS = 6e-3
 """Of the rigid plate that holds a row of chambers, metres, as the bellow's of Yao et al."""
+PLATE_THICKNESS = 3e-3
+"""Of the plate on the cap at most, metres: what the camera finds is a plate, as tall as the
+actuator, not a plug."""
 _CONNECTOR_MARGIN = 2e-3
 """By which that plate stands out over the chambers, metres."""
 _PIECE = 2e-3
@@ -67,7 +70,6 @@ def _row_profile(row: ChamberRow, angle: float) -> SideProfile:
     steps.append(np.array([row.end, 0.0]))
     upper = np.stack(steps)
     upper[[0, -1], 1] = floor
-    last = row.segments[-1].outline.high - row.underside
     return SideProfile(
         connector=np.array(
             [
@@ -79,7 +81,7 @@ def _row_profile(row: ChamberRow, angle: float) -> SideProfile:
         ),
         bellow=_bent(row, angle, upper[::-1]),
         bottom_layer=_bent(row, angle, _box(near, row.end, floor)),
-        end_cap=_bent(row, angle, _box(row.end, row.tip, last)),
+        end_cap=_bent(row, angle, _box(row.end, min(row.tip, row.end + PLATE_THICKNESS), top)),
     )
 
 

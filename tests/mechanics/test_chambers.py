@@ -16,7 +16,7 @@ from rig.mechanics.errors import MechanicsError
 from rig.mechanics.fe import PressureSurface, discretise
 from rig.mechanics.mesh.chamber_row import RowResolution, mesh_chamber_row
 from rig.mechanics.mesh.measure import solid_volume
-from rig.mechanics.outline import bending_shape, side_profile
+from rig.mechanics.outline import PLATE_THICKNESS, bending_shape, side_profile
 from rig.spec.actuator import BellowAxisymmetricGeometry
 from rig.spec.chambers import (
     BellowRectangularGeometry,
@@ -116,7 +116,7 @@ def test_the_cap_turns_by_the_angle_and_the_layer_keeps_its_length(angle, which)
     turned = np.arctan2(-heading[1], heading[0])
     assert np.cos(turned - angle) == pytest.approx(1.0, abs=1e-9)
     assert shoelace(shown.end_cap) == pytest.approx(
-        row.cap_thickness * row.segments[-1].outline.high, rel=1e-9
+        min(row.cap_thickness, PLATE_THICKNESS) * row.height, rel=1e-9
     )
     below = shown.bottom_layer[: int(np.ceil(row.end / 2e-3)) + 1]
     length = np.linalg.norm(np.diff(below, axis=0), axis=1).sum()
