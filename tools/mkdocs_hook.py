@@ -27,7 +27,7 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
 
 
 def _filled(entry: dict[str, Any], docs: Path) -> dict[str, Any]:
-    """The entry; where it names a folder, with that folder's pages, `index.md` before the others."""
+    """The entry; where it names a folder, that folder's pages, `index.md` before the others."""
     ((title, place),) = entry.items()
     if not isinstance(place, str) or not place.endswith("/"):
         return entry
