@@ -12,8 +12,11 @@ from pathlib import Path
 
 from setuptools import setup
 from setuptools.command.build_py import build_py
+from setuptools.command.sdist import sdist
 
 ROOT = Path(__file__).resolve().parent
+SHIPPED_REVISION = "REVISION"
+"""File of a source distribution that holds the commit it was made from."""
 LIBRARY = (
     "models/**/*",
     "calibration/*",
@@ -26,7 +29,12 @@ LIBRARY = (
 
 
 def revision() -> str:
-    """The commit that is built; zeros outside a checkout."""
+    """The commit that is built; zeros where nothing tells."""
+    shipped = ROOT / SHIPPED_REVISION
+    if shipped.is_file():
+        return shipped.read_text(encoding="ascii").strip()
+    if not (ROOT / ".git").exists():
+        return "000000"  # git would answer with the commit of a repository around this folder
     try:
         answer = subprocess.run(
             ["git", "rev-parse", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=True
@@ -34,6 +42,15 @@ def revision() -> str:
     except (OSError, subprocess.CalledProcessError):
         return "000000"
     return answer.stdout.strip()
+
+
+class SourceWithRevision(sdist):
+    """Tells whoever builds from a source distribution which commit it is."""
+
+    def make_release_tree(self, base_dir: str, files: list[str]) -> None:
+        """Copy the files as usual, then add the commit."""
+        super().make_release_tree(base_dir, files)
+        (Path(base_dir) / SHIPPED_REVISION).write_text(revision(), encoding="ascii")
 
 
 class BuildWithLibrary(build_py):
@@ -66,7 +83,7 @@ class BuildWithLibrary(build_py):
 
 
 setup(
-    cmdclass={"build_py": BuildWithLibrary},
+    cmdclass={"build_py": BuildWithLibrary, "sdist": SourceWithRevision},
     cffi_modules=[
         "firmware/host/build_firmware.py:ffibuilder",
         "rig/plant/native/build_plant.py:ffibuilder",
