@@ -88,3 +88,8 @@ def read_truth(path: Path) -> list[TruthSample]:
             TruthSample(**json.loads(message.data))
             for _, _, message in make_reader(stream).iter_messages(topics=["/truth"])
         ]
+
+
+def truth_path(folder: Path, segment: int) -> Path:
+    """Where the virtual bench writes what it knew; each resumption of a run has its own file."""
+    return folder / ("truth.mcap" if segment == 0 else f"truth-{segment + 1}.mcap")

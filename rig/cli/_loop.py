@@ -9,13 +9,14 @@ from pathlib import Path
 from rich.console import Console
 
 from rig.board.real import RealBench
+from rig.board.truth import truth_path
 from rig.board.virtual import VirtualBench
 from rig.cli._calculation import calculating
 from rig.cli._interruption import catching_signals
-from rig.cli._session import require_measured_calibrations, truth_path
 from rig.experiment.bench import Bench
 from rig.experiment.identification import LoopRequest
 from rig.experiment.recorded import RunOutcome
+from rig.experiment.request import require_measured_calibrations
 from rig.experiment.setup import require_valid_calibrations
 from rig.mechanics.outline import bending_shape
 from rig.record.writer import require_free_folder

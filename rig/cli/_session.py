@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from datetime import date, datetime
+from datetime import date
 from pathlib import Path
 
 from rich.console import Console
@@ -15,6 +15,7 @@ from rich.table import Table
 
 from rig.board.errors import BoardError
 from rig.board.real import RealBench
+from rig.board.truth import truth_path
 from rig.board.virtual import VirtualBench, require_simulated
 from rig.cli._calculation import calculating
 from rig.cli._interruption import catching_signals
@@ -23,17 +24,13 @@ from rig.cli._summary import show_summary
 from rig.experiment.bench import Bench, Observer
 from rig.experiment.doctor import Finding, look_at_bench, look_at_machine
 from rig.experiment.errors import ExperimentError
-from rig.experiment.plan import make_plan
-from rig.experiment.program import plan_trials
 from rig.experiment.recorded import RunOutcome
+from rig.experiment.request import make_request, require_measured_calibrations
 from rig.experiment.run import new_run, resume_run
 from rig.experiment.setup import (
     RunRequest,
-    expired_calibrations,
-    require_valid_calibrations,
 )
 from rig.link.errors import LinkError
-from rig.mechanics.outline import bending_shape
 from rig.record.reader import RunReader
 from rig.record.writer import require_free_folder
 from rig.spec.faults import FaultScript
@@ -264,39 +261,4 @@ def resumed_session(run: Path, *, expired: bool = False) -> Session:
 
 
 def _session(setup: Setup, seed: int, logs: Path, expired: bool) -> Session:
-    today = date.today()
-    if not expired:
-        require_valid_calibrations(setup.calibrations, today)
-    caution = expired_calibrations(setup.calibrations, today)
-    cavity = bending_shape(setup.actuator.geometry).cavity_volume
-    request = RunRequest(
-        setup=setup,
-        plan=make_plan(setup.protocol, setup.actuator, setup.bench),
-        seed=seed,
-        cavity_volume=cavity,
-        trials=plan_trials(setup, cavity),
-        created=None
-        if setup.bench.simulated
-        else datetime.now().astimezone().isoformat(timespec="seconds"),
-        cautions=() if caution is None else (caution,),
-    )
-    request.board_parameters()  # a board would refuse them only once the bench is open
-    return Session(request, logs, _RunConsole())
-
-
-def require_measured_calibrations(setup: Setup) -> None:
-    """Refuse a real bench with the calibrations of the virtual one: its figures would be false."""
-    named = setup.calibrations.by_role().items()
-    simulated = [role.replace("_", " ") for role, c in named if c.provenance.simulated]
-    if simulated:
-        raise ExperimentError(
-            f"the bench '{setup.bench.name}' is a real one, but its calibrations of "
-            f"{', '.join(simulated)} define the virtual bench (provenance.simulated). Nothing was "
-            "moved. Calibrate these instruments, write what you found into files of their own in "
-            "calibration/, and name those in the bench."
-        )
-
-
-def truth_path(folder: Path, segment: int) -> Path:
-    """Where the virtual bench writes what it knew; each resumption of a run has its own file."""
-    return folder / ("truth.mcap" if segment == 0 else f"truth-{segment + 1}.mcap")
+    return Session(make_request(setup, seed, expired=expired), logs, _RunConsole())

@@ -8,7 +8,8 @@ from starlette.types import ASGIApp
 
 from rig.studio.access import Access
 from rig.studio.gate import MAX_BODY, Gate
-from rig.studio.pages import design, runs
+from rig.studio.live import live_route
+from rig.studio.pages import bench, design, runs
 from rig.studio.routes import routes
 from rig.studio.state import Studio
 
@@ -22,7 +23,8 @@ def application(studio: Studio, access: Access) -> ASGIApp:
     """Everything that is served; one for each process, as the pages are registered globally."""
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     app.include_router(routes(studio))
-    for page in (design, runs):
+    app.include_router(live_route(studio.desk))
+    for page in (design, bench, runs):
         page.register(studio)
     core.sio.eio.max_http_buffer_size = MAX_BODY
     ui.run_with(

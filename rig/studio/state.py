@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import secrets
+import time
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from rig.spec.workspace import Workspace
 from rig.studio.calculation import Calculation
+from rig.studio.desk import Desk
 from rig.studio.errors import StudioError
+from rig.studio.seat import Seat
+from rig.studio.works import report
 
 MOST_CALCULATIONS = 2
 MOST_VIEWS = 12
@@ -66,7 +71,16 @@ class Studio:
     workspace: Workspace
     workshop: Workshop = field(default_factory=Workshop)
     views: Views = field(default_factory=Views)
+    desk: Desk = field(init=False)
+
+    def __post_init__(self) -> None:
+        desk = Desk(self.workspace, Seat(time.monotonic), self._report)
+        object.__setattr__(self, "desk", desk)
+
+    def _report(self, folder: Path) -> None:
+        self.workshop.start(report, folder)
 
     def close(self) -> None:
-        """Leave nothing running."""
+        """Leave nothing running and nothing under pressure."""
+        self.desk.close()
         self.workshop.close()

@@ -42,7 +42,7 @@ def register(studio: Studio) -> None:
 
     @ui.page("/", title="Design - rig studio")
     def _page(actuator: str = "") -> None:
-        with frame("Design"):
+        with frame(studio, "Design"):
             DesignPage(studio, actuator)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Literal
@@ -9,14 +10,21 @@ from typing import Literal
 from nicegui import ui
 
 from rig.errors import RigError
+from rig.studio.state import Studio
 
 Kind = Literal["positive", "negative", "warning", "info"]
-PAGES = (("Design", "/"), ("Runs", "/runs"))
+BENCH = "Bench"
+PAGES = (("Design", "/"), ("Bench", "/bench"), ("Runs", "/runs"))
 
 
 @contextmanager
-def frame(here: str) -> Iterator[None]:
-    """Header and main part of a page."""
+def frame(studio: Studio, here: str) -> Iterator[None]:
+    """Header and main part of a page; its pulse keeps the seat at the bench."""
+    client = ui.context.client
+    watch = json.dumps(here == BENCH)
+    client.on_connect(
+        lambda: client.run_javascript(f"studioLive({json.dumps(client.tab_id)}, {watch})")
+    )
     ui.add_head_html(
         '<link rel="stylesheet" href="/assets/studio.css"><script src="/assets/studio.js"></script>'
     )
@@ -28,6 +36,11 @@ def frame(here: str) -> Iterator[None]:
             if name == here:
                 link.classes("here").props('aria-current="page"')
         ui.element("div").classes("spacer")
+        ui.html('<span class="muted" data-live="summary"></span>', sanitize=False)
+        # anybody may make the bench safe, from every page
+        ui.button("Vent and stop", on_click=studio.desk.vent, color=None).classes("stop").props(
+            "unelevated"
+        )
     with ui.element("main").props("id=main").classes("stack column"):
         ui.html(f"<h1>{here}</h1>", sanitize=False)
         yield

@@ -23,7 +23,7 @@ def register(studio: Studio) -> None:
 
     @ui.page("/runs", title="Runs - rig studio")
     def _page() -> None:
-        with frame("Runs"):
+        with frame(studio, "Runs"):
             RunsPage(studio)
 
 

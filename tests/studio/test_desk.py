@@ -1,0 +1,248 @@
+"""The bench behind the page: orders, limits, the seat, a run, and a browser that is lost."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from fastapi import FastAPI
+from starlette.testclient import TestClient
+from starlette.websockets import WebSocketDisconnect
+
+from rig.experiment.errors import LimitError
+from rig.record.reader import RunReader
+from rig.spec.workspace import Workspace, library_root
+from rig.studio.desk import LOST, Choice, Desk
+from rig.studio.errors import StudioError
+from rig.studio.live import live_route, message
+from rig.studio.seat import PATIENCE_S, Seat
+from rig.studio.watched import LEFT_BEHIND_S, Pace
+
+BEAM = Choice("bellow-bending", "virtual-beam", seed=1, speed=20.0)
+SPECS = Path(__file__).parents[1] / "specs"
+PATIENT_S = 60.0
+"""Against a test that hangs; nothing is asserted of it."""
+
+
+class Clock:
+    now_s = 0.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def desk(tmp_path: Path, clock: Clock) -> Iterator[Desk]:
+    for folder in ("models", "calibration"):
+        shutil.copytree(library_root() / folder, tmp_path / folder)
+    shutil.copy(SPECS / "bellow-bending.yaml", tmp_path / "models/actuators")
+    (tmp_path / "models/protocols/tiny.yaml").write_text(
+        "kind: protocol\nname: tiny\ndescription: two points\n"
+        "deformation:\n  pressures: {start: 0 kPa, stop: 2 kPa, step: 2 kPa}\n  repeats: 1\n"
+        "  descending_repeats: 0\n  conditioning: 0\n  rest: 1 s\n"
+        "  settling: {tolerance: 0.05 kPa, window: 1 s, timeout: 60 s}\n  hold: 1 s\n  frames: 1\n"
+    )
+    made = Desk(Workspace(tmp_path), Seat(clock))
+    yield made
+    made.close()
+    assert not made.is_open
+
+
+def until(condition: Callable[[], bool]) -> None:
+    end_s = time.monotonic() + PATIENT_S
+    while not condition():
+        assert time.monotonic() < end_s, "it never came to that"
+        time.sleep(0.01)
+
+
+def connected(desk: Desk, choice: Choice = BEAM) -> None:
+    desk.seat.take("me")
+    desk.connect("me", choice)
+    until(lambda: desk.scope.reading().state == "idle" and not desk.activity.doing)
+
+
+def pressurised(desk: Desk) -> None:
+    connected(desk)
+    desk.order("me", "home")
+    until(lambda: "homed" in desk.scope.reading().flags)
+    desk.order("me", "zero_pressure")
+    until(lambda: "zeroed" in desk.scope.reading().flags)
+    desk.order("me", "set_pressure", 4.0)
+    until(lambda: desk.scope.since(0)[-1][2] > 3.5)
+
+
+def vented(desk: Desk) -> bool:
+    reading = desk.scope.reading()
+    return reading.state == "idle" and "valve open" in reading.flags
+
+
+def test_home_zero_and_a_set_point_and_anybody_may_vent(desk: Desk) -> None:
+    pressurised(desk)
+    assert desk.scope.reading().state == "run"
+    desk.vent()
+    until(lambda: vented(desk))
+
+
+def test_a_browser_that_falls_silent_leaves_a_vented_bench_and_a_free_seat(
+    desk: Desk, clock: Clock
+) -> None:
+    pressurised(desk)
+    clock.now_s += PATIENCE_S
+    time.sleep(0.05)
+    assert desk.scope.reading().state == "run"
+    clock.now_s += 0.1
+    until(lambda: vented(desk))
+    assert desk.activity.said == LOST
+    assert desk.seat.holder is None
+    with pytest.raises(StudioError, match="take control first"):
+        desk.order("me", "home")
+
+
+def test_giving_control_back_vents(desk: Desk) -> None:
+    pressurised(desk)
+    desk.release("somebody else")
+    assert desk.seat.holder == "me"
+    desk.release("me")
+    until(lambda: vented(desk))
+
+
+def test_who_watches_moves_nothing(desk: Desk) -> None:
+    connected(desk)
+    for asked in (
+        lambda: desk.order("other", "jog", 1.0),
+        lambda: desk.take("other", "tiny"),
+        lambda: desk.disconnect("other"),
+        lambda: desk.connect("other", BEAM),
+        lambda: desk.answer("other"),
+    ):
+        with pytest.raises(StudioError, match="take control first"):
+            asked()
+
+
+def test_a_set_point_beyond_a_limit_never_reaches_the_board(desk: Desk) -> None:
+    connected(desk)
+    with pytest.raises(LimitError, match=r"limits\.pressure of the actuator"):
+        desk.order("me", "set_pressure", 12.5)
+    with pytest.raises(StudioError, match="0 kPa or more"):
+        desk.order("me", "set_pressure", -1.0)
+    with pytest.raises(StudioError, match="mL/s at most"):
+        desk.order("me", "jog", 3.0)
+
+
+def test_what_the_board_refuses_is_said_in_its_words(desk: Desk) -> None:
+    connected(desk)
+    desk.order("me", "set_pressure", 3.0)
+    until(lambda: "not_homed" in desk.activity.said)
+
+
+def test_only_names_of_the_workspace_are_opened(desk: Desk) -> None:
+    desk.seat.take("me")
+    for choice in (
+        Choice("/etc/passwd", "virtual-beam"),
+        Choice("bellow-bending", "../benches/virtual-beam"),
+    ):
+        with pytest.raises(StudioError, match="of this workspace"):
+            desk.connect("me", choice)
+    connected(desk)
+    with pytest.raises(StudioError, match="protocol of this workspace"):
+        desk.take("me", "../protocols/tiny")
+    with pytest.raises(StudioError, match="connected already"):
+        desk.connect("me", BEAM)
+
+
+def test_a_run_is_recorded_as_from_the_command_line_and_the_bench_comes_back(desk: Desk) -> None:
+    folders: list[Path] = []
+    desk.after_run = folders.append
+    connected(desk, Choice("bellow-bending", "virtual-beam", seed=3, speed=0.0))
+    desk.take("me", "tiny")
+    until(lambda: bool(folders) and desk.activity.doing == "" and desk.activity.total == 0)
+    assert "success" in desk.activity.said
+    reader = RunReader(folders[0])
+    assert reader.complete
+    assert len(reader.points()) == 2
+    assert desk.picture.startswith(b"\xff\xd8")
+    until(lambda: desk.scope.reading().state == "idle")
+
+
+def test_vent_stops_a_run_and_its_log_says_so(desk: Desk) -> None:
+    folders: list[Path] = []
+    desk.after_run = folders.append
+    connected(desk)
+    desk.take("me", "tiny")
+    until(lambda: desk.activity.total == 2)
+    desk.vent()
+    until(lambda: bool(folders))
+    stop = RunReader(folders[0]).stop()
+    assert stop is not None
+    assert stop.exit_status == "aborted"
+    assert "stopped in the studio" in stop.reason
+
+
+# --- the live WebSocket ------------------------------------------------------------------------
+
+
+def test_the_live_message_tells_who_controls_and_only_new_samples(desk: Desk) -> None:
+    connected(desk)
+    until(lambda: desk.scope.number > 5)
+    text, number = message(desk, "me", True, 0)
+    first = json.loads(text)
+    assert first["control"] == "yours"
+    assert first["connected"] == "virtual-beam"
+    assert len(first["samples"]) >= 5
+    again, _ = message(desk, "other", True, number)
+    assert json.loads(again)["control"] == "another's"
+    assert len(json.loads(again)["samples"]) < len(first["samples"])
+    quiet, _ = message(desk, "other", False, 0)
+    assert json.loads(quiet)["samples"] == []
+
+
+def test_an_answer_keeps_the_seat_and_a_session_must_have_a_name(desk: Desk, clock: Clock) -> None:
+    app = FastAPI()
+    app.include_router(live_route(desk))
+    desk.seat.take("me")
+    client = TestClient(app)
+    with client.websocket_connect("/live?session=me&watch=1") as socket:
+        assert desk.watchers == 1
+        assert json.loads(socket.receive_text())["control"] == "yours"
+        clock.now_s = 2 * PATIENCE_S
+        socket.send_text("heard")
+        socket.receive_text()
+        until(lambda: desk.seat._heard_s == clock.now_s)
+        assert not desk.seat.lapsed()
+    until(lambda: desk.watchers == 0)
+    for session in ("", "x" * 81):
+        with (
+            pytest.raises(WebSocketDisconnect),
+            client.websocket_connect(f"/live?session={session}") as socket,
+        ):
+            socket.receive_text()
+
+
+def test_simulated_time_keeps_pace_and_a_late_bench_does_not_race() -> None:
+    clock = Clock()
+
+    def sleep(duration_s: float) -> None:
+        clock.now_s += duration_s
+
+    pace = Pace(2.0, clock, sleep)
+    pace.keep(0.0)
+    pace.keep(4.0)
+    assert clock.now_s == pytest.approx(2.0)
+    clock.now_s += 10.0
+    pace.keep(4.1)
+    assert clock.now_s == pytest.approx(12.0)
+    pace.keep(5.1)
+    assert clock.now_s == pytest.approx(12.5)
+    assert LEFT_BEHIND_S < 10.0
+    free = Pace(0.0, clock, sleep)
+    free.keep(1e9)
+    assert clock.now_s == pytest.approx(12.5)
