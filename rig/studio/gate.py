@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import html
+import logging
 from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qs, urlencode
 
@@ -13,6 +13,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from rig.studio.access import Access, Asked, Refusal
 
+LOG = logging.getLogger(__name__)
 COOKIE = "rig_studio"
 MAX_BODY = 1 << 20
 """Bytes of a request; specs are a few kilobytes."""
@@ -106,8 +107,16 @@ class Gate:
                     headers.setdefault(name, value)
             await send(message)
 
-        with contextlib.suppress(TooLargeError):
+        try:
             await self._app(scope, counted, decorated)
+        except TooLargeError:
+            LOG.warning("a request of more than %d bytes was refused", MAX_BODY)
+        except Exception as error:
+            if scope["type"] == "http":
+                raise
+            # what a library makes of a malformed message ends that connection, and nothing else
+            LOG.warning("a WebSocket was closed: %s: %s", type(error).__name__, error)
+            return
         if exceeded and not started:
             await _too_large()(scope, receive, send)
 

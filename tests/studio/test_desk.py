@@ -218,7 +218,8 @@ def test_an_answer_keeps_the_seat_and_a_session_must_have_a_name(desk: Desk, clo
         socket.receive_text()
         until(lambda: desk.seat._heard_s == clock.now_s)
         assert not desk.seat.lapsed()
-    until(lambda: desk.watchers == 0)
+        socket.close()
+        until(lambda: desk.watchers == 0)
     for session in ("", "x" * 81):
         with (
             pytest.raises(WebSocketDisconnect),
