@@ -1,0 +1,139 @@
+"""Serves the channels of a log over Foxglove's WebSocket protocol, on this machine alone.
+
+The protocol knows neither tokens nor users, so there is no way to bind another address than
+loopback; `ssh -L` brings it to another machine. Clients can only read.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+from rig.record.errors import RecordError
+from rig.record.follow import LogFollower, LoggedChannel
+
+if TYPE_CHECKING:
+    import foxglove
+
+LOOPBACK = "127.0.0.1"
+NS = 1_000_000_000
+POLL_S = 0.2
+BACKLOG = 65_536
+"""Messages that may wait for a client before the oldest are dropped; a chunk comes at once."""
+
+
+class LiveServer:
+    """The server, running until it is closed; port 0 takes a free one.
+
+    Raises RecordError if the library is missing or the port is taken.
+    """
+
+    def __init__(self, port: int) -> None:
+        try:
+            import foxglove
+        except ImportError as error:
+            raise RecordError(
+                "The Foxglove server needs the library foxglove-sdk, which is not installed. "
+                "Install it with `pip install 'rig[watch]'`."
+            ) from error
+        self._library = foxglove
+        self._context = foxglove.Context()
+        self._channels: dict[str, foxglove.Channel] = {}
+        self._subscribed = threading.Event()
+        listener: Any = _Listener(self._subscribed)  # the protocol's other events need capabilities
+        try:
+            self._server = foxglove.start_server(
+                name="rig",
+                host=LOOPBACK,
+                port=port,
+                context=self._context,
+                server_listener=listener,
+                message_backlog_size=BACKLOG,
+            )
+        except (OSError, RuntimeError, ValueError) as error:
+            raise RecordError(
+                f"the Foxglove server cannot listen on port {port}: {error}. Another program may "
+                f"use it; choose another one with --port."
+            ) from error
+
+    @property
+    def url(self) -> str:
+        """What to connect to."""
+        return f"ws://{LOOPBACK}:{self._server.port}"
+
+    def __enter__(self) -> LiveServer:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._server.stop()
+
+    def advertise(self, channel: LoggedChannel) -> None:
+        """Tell clients of a channel, once."""
+        if channel.topic not in self._channels:
+            name, encoding, data = channel.schema
+            self._channels[channel.topic] = self._library.Channel(
+                channel.topic,
+                schema=self._library.Schema(name=name, encoding=encoding, data=data),
+                message_encoding=channel.encoding,
+                context=self._context,
+            )
+
+    def send(self, channel: LoggedChannel, time_ns: int, payload: bytes) -> None:
+        """Pass a message on to whoever subscribed to its channel."""
+        self._channels[channel.topic].log(payload, log_time=time_ns)
+
+    def wait_for_somebody(self, timeout_s: float) -> bool:
+        """Whether somebody has subscribed to anything, after waiting for it."""
+        return self._subscribed.wait(timeout_s)
+
+
+class _Listener:
+    """Notes the first subscription."""
+
+    def __init__(self, subscribed: threading.Event) -> None:
+        self._subscribed = subscribed
+
+    def on_subscribe(self, *_: Any) -> None:
+        self._subscribed.set()
+
+    def on_unsubscribe(self, *_: Any) -> None:
+        """A client that leaves changes nothing: the run goes on."""
+
+
+def relay(follower: LogFollower, server: LiveServer, speed: float) -> int:
+    """Serve a log from its beginning to its end, waiting for more while it is being written.
+
+    Bench time runs `speed` times as fast as the clock on the wall; 0 sends what is there at once.
+    Begins when somebody subscribes. Returns how many messages were sent.
+    """
+    waiting: deque[tuple[int, int]] = deque()
+    sent = 0
+    began: tuple[float, int] | None = None
+    somebody = False
+    while not (follower.finished and somebody and not waiting):
+        waiting += follower.poll()
+        for channel in follower.channels.values():
+            server.advertise(channel)
+        if not somebody:
+            somebody = server.wait_for_somebody(POLL_S)
+            time.sleep(POLL_S)  # the first subscription is followed by those of other channels
+            continue
+        if not waiting:
+            time.sleep(POLL_S)
+            continue
+        for channel, time_ns, payload in follower.messages(waiting.popleft()):
+            if speed:
+                began = began or (time.monotonic(), time_ns)
+                due = began[0] + (time_ns - began[1]) / NS / speed
+                time.sleep(max(0.0, due - time.monotonic()))
+            server.send(channel, time_ns, payload)
+            sent += 1
+    return sent

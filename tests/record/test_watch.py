@@ -1,0 +1,164 @@
+"""A run over Foxglove's WebSocket, as a client of that protocol sees it.
+
+Protocol: https://github.com/foxglove/ws-protocol; binary message data are opcode 1, subscription,
+log time and payload.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+from recorded_runs import ATTACHMENTS, START, UNITS, write_point, write_run
+
+from rig.record.channels import POINTS_TOPIC, telemetry_topic
+from rig.record.errors import RecordError
+from rig.record.follow import LogFollower
+from rig.record.live import POLL_S, LiveServer, relay
+from rig.record.reader import RunReader
+from rig.record.writer import RunWriter
+
+pytest.importorskip("foxglove", reason="the server needs rig[watch]")
+websockets = pytest.importorskip("websockets.sync.client")
+
+Message = tuple[str, int, bytes]
+
+
+class Client:
+    """Subscribes to every channel that is advertised and keeps what it is sent."""
+
+    def __init__(self, socket: Any) -> None:
+        self._socket = socket
+        self.channels: dict[str, dict[str, str]] = {}
+        self._topics: dict[int, str] = {}
+        self.received: list[Message] = []
+
+    def receive(self, messages: int) -> None:
+        """Until so many messages have come; raises TimeoutError after half a minute of silence."""
+        while len(self.received) < messages:
+            frame = self._socket.recv(timeout=30)
+            if isinstance(frame, str):
+                self._answer(json.loads(frame))
+            elif frame[0] == 1:
+                subscription, time_ns = struct.unpack_from("<IQ", frame, 1)
+                self.received.append((self._topics[subscription], time_ns, frame[13:]))
+
+    def _answer(self, said: dict[str, object]) -> None:
+        if said["op"] != "advertise":
+            return
+        subscriptions = []
+        for channel in said["channels"]:
+            self.channels[channel["topic"]] = channel
+            self._topics[channel["id"]] = channel["topic"]
+            subscriptions.append({"id": channel["id"], "channelId": channel["id"]})
+        self._socket.send(json.dumps({"op": "subscribe", "subscriptions": subscriptions}))
+
+
+def everything(folder: Path) -> list[Message]:
+    follower = LogFollower(folder)
+    chunks = follower.poll()
+    return [
+        (channel.topic, time_ns, payload)
+        for chunk in chunks
+        for channel, time_ns, payload in follower.messages(chunk)
+    ]
+
+
+def test_a_follower_reads_what_the_log_holds(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "run")
+    counts = RunReader(folder).counts()
+    read = [topic for topic, _, _ in everything(folder)]
+    assert {topic: read.count(topic) for topic in counts} == counts
+    assert len(read) == sum(counts.values()) > 1000
+
+
+def test_a_client_gets_the_channels_of_the_log_and_their_messages(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "run", points=2)
+    follower = LogFollower(folder)
+    expected = everything(folder)
+    with LiveServer(0) as server:
+        assert server.url.startswith("ws://127.0.0.1:")
+        sending = threading.Thread(target=relay, args=(follower, server, 0.0))
+        sending.start()
+        with websockets.connect(
+            server.url, subprotocols=["foxglove.sdk.v1"], max_size=None, close_timeout=0.2
+        ) as socket:
+            client = Client(socket)
+            client.receive(len(expected))
+        sending.join(timeout=30)
+        assert not sending.is_alive()
+    logged = {c.topic: c for c in follower.channels.values()}
+    assert set(client.channels) == set(logged)
+    for topic, channel in client.channels.items():
+        assert channel["schemaName"] == logged[topic].schema[0]
+        assert channel["schemaEncoding"] == logged[topic].schema[1]
+        assert channel["encoding"] == logged[topic].encoding
+    assert sorted(client.received) == sorted(expected)
+    topic = telemetry_topic("PRESSURE")
+    (first, *_) = [json.loads(m[2]) for m in client.received if m[0] == topic]
+    assert set(first) == {"pressure_kpa", "setpoint_kpa"}
+
+
+def test_a_run_in_progress_is_followed_to_its_end(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    with RunWriter.create(folder, START, ATTACHMENTS, UNITS) as writer:
+        follower = LogFollower(folder)
+        assert follower.poll() == []
+        seen = 0
+        for number in range(3):
+            write_point(writer, number)
+            topics = [m[0].topic for c in follower.poll() for m in follower.messages(c)]
+            assert topics.count(POINTS_TOPIC) == 1
+            seen += len(topics)
+            assert not follower.finished
+    rest = [m for c in follower.poll() for m in follower.messages(c)]
+    assert follower.finished
+    assert seen + len(rest) == len(everything(folder))
+
+
+def test_a_log_that_resuming_replaced_is_read_again(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "run", points=2, stop=False)
+    follower = LogFollower(folder)
+    before = sum(len(list(follower.messages(c))) for c in follower.poll())
+    with RunWriter.resume(folder, keep_points=1, units=UNITS) as writer:
+        write_point(writer, 1)
+    after = sum(len(list(follower.messages(c))) for c in follower.poll())
+    assert before == after == len(everything(folder))
+
+
+def test_bench_time_passes_at_the_speed_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    slept: list[float] = []
+    monkeypatch.setattr("rig.record.live.time.sleep", slept.append)
+    monkeypatch.setattr("rig.record.live.time.monotonic", lambda: sum(slept))
+
+    class Listening:
+        advertise = send = staticmethod(lambda *_: None)
+        wait_for_somebody = staticmethod(lambda _: True)
+
+    folder = write_run(tmp_path / "run", points=2)
+    times = [time_ns for _, time_ns, _ in everything(folder)]
+    relay(LogFollower(folder), Listening(), 4.0)  # type: ignore[arg-type]
+    before, *between = slept
+    assert before == POLL_S
+    assert sum(between) == pytest.approx((max(times) - times[0]) / 1e9 / 4)
+
+
+@pytest.mark.parametrize("content", [None, b"", b"no log at all"])
+def test_what_is_no_log_is_refused(tmp_path: Path, content: bytes | None) -> None:
+    if content is not None:
+        (tmp_path / "run.mcap").write_bytes(content)
+    with pytest.raises(RecordError, match=r"run\.mcap"):
+        LogFollower(tmp_path)
+
+
+def test_a_port_that_is_taken_is_told() -> None:
+    with LiveServer(0) as server:
+        port = int(server.url.rsplit(":", 1)[1])
+        with pytest.raises(RecordError, match="--port"):
+            LiveServer(port)
