@@ -58,7 +58,7 @@ class ChamberRow:
     cap_thickness: float
     """Of the rigid cap in m; it has the last segment's outline."""
     wall: float
-    """Thinnest wall in m."""
+    """Thinnest wall along the row in m; where chambers are thinner than walls, a chamber."""
     gap: float
     """Between facing outer walls of neighbours at rest in m; 0 where there are none."""
     layer: float = 0.0
@@ -196,7 +196,7 @@ def _block(
     return ChamberRow(
         tuple(row()),
         cap_thickness=g.end_cap_thickness,
-        wall=t,
+        wall=min(t, g.chamber_length),
         gap=0.0,
         layer=layer or 0.0,
     )
