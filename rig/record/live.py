@@ -75,16 +75,18 @@ class LiveServer:
     ) -> None:
         self._server.stop()
 
-    def advertise(self, channel: LoggedChannel) -> None:
-        """Tell clients of a channel, once."""
-        if channel.topic not in self._channels:
-            name, encoding, data = channel.schema
-            self._channels[channel.topic] = self._library.Channel(
-                channel.topic,
-                schema=self._library.Schema(name=name, encoding=encoding, data=data),
-                message_encoding=channel.encoding,
-                context=self._context,
-            )
+    def advertise(self, channel: LoggedChannel) -> bool:
+        """Tell clients of a channel, once; whether it was new to them."""
+        if channel.topic in self._channels:
+            return False
+        name, encoding, data = channel.schema
+        self._channels[channel.topic] = self._library.Channel(
+            channel.topic,
+            schema=self._library.Schema(name=name, encoding=encoding, data=data),
+            message_encoding=channel.encoding,
+            context=self._context,
+        )
+        return True
 
     def send(self, channel: LoggedChannel, time_ns: int, payload: bytes) -> None:
         """Pass a message on to whoever subscribed to its channel."""
@@ -120,13 +122,12 @@ def relay(follower: LogFollower, server: LiveServer, speed: float) -> int:
     somebody = False
     while not (follower.finished and somebody and not waiting):
         waiting += follower.poll()
-        for channel in follower.channels.values():
-            server.advertise(channel)
+        new = [channel for channel in follower.channels.values() if server.advertise(channel)]
         if not somebody:
             somebody = server.wait_for_somebody(POLL_S)
             time.sleep(POLL_S)  # the first subscription is followed by those of other channels
             continue
-        if not waiting:
+        if new or not waiting:  # what is sent before clients subscribe is lost to them
             time.sleep(POLL_S)
             continue
         for channel, time_ns, payload in follower.messages(waiting.popleft()):

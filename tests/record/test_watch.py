@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from recorded_runs import ATTACHMENTS, START, UNITS, write_point, write_run
+from recorded_runs import ATTACHMENTS, START, UNITS, point, write_point, write_run
 
 from rig.record.channels import POINTS_TOPIC, telemetry_topic
 from rig.record.errors import RecordError
@@ -118,6 +118,26 @@ def test_a_run_in_progress_is_followed_to_its_end(tmp_path: Path) -> None:
     rest = [m for c in follower.poll() for m in follower.messages(c)]
     assert follower.finished
     assert seen + len(rest) == len(everything(folder))
+
+
+def test_a_client_loses_nothing_of_a_run_in_progress(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    with LiveServer(0) as server, RunWriter.create(folder, START, ATTACHMENTS, UNITS) as writer:
+        writer.point(point(0), 4.0)  # the other channels come with the next
+        sending = threading.Thread(target=relay, args=(LogFollower(folder), server, 0.0))
+        sending.start()
+        with websockets.connect(
+            server.url, subprotocols=["foxglove.sdk.v1"], max_size=None, close_timeout=0.2
+        ) as socket:
+            client = Client(socket)
+            client.receive(1)
+            for number in (1, 2):
+                write_point(writer, number)
+                client.receive(len(everything(folder)))
+                assert len(client.received) == len(everything(folder))
+            writer.close()
+        sending.join(timeout=30)
+        assert not sending.is_alive()
 
 
 def test_a_log_that_resuming_replaced_is_read_again(tmp_path: Path) -> None:
