@@ -64,7 +64,7 @@ class StampedCamera:
 def open_camera(
     camera: Camera, mode: CameraCalibration, now_s: Callable[[], float]
 ) -> StampedCamera:
-    """The real camera of a bench, in the size of `mode`; raises BoardError."""
+    """The real camera of a bench, in the size of `mode` and with its latency; raises BoardError."""
     device = camera.device
     size = (mode.width, mode.height)
     if isinstance(device, OpenCvCameraDevice):
@@ -78,7 +78,8 @@ def open_camera(
             "a real board needs a real camera; set camera.device to kind 'opencv' with the number "
             "of the device, or to kind 'realsense'."
         )
-    return StampedCamera(source, name, camera.jpeg_quality, camera.latency, now_s)
+    latency_s = mode.latency_s(camera.latency)
+    return StampedCamera(source, name, camera.jpeg_quality, latency_s, now_s)
 
 
 class OpenCvSource:

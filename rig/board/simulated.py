@@ -7,6 +7,8 @@ from collections.abc import Callable
 from typing import Protocol
 
 BUFFER_BYTES = 1 << 16
+STRETCH_MS = 20
+"""At most so much is simulated between two looks of a witness."""
 
 
 class SteppedBench(Protocol):
@@ -35,6 +37,8 @@ class SimulatedBoard(ABC):
         self._start_s = start_s
         self._after_poll = after_poll
         self._owed_ms = 0.0
+        self.witness: Callable[[], None] | None = None
+        """Is called at least every `STRETCH_MS` of simulated time."""
 
     @property
     def now_s(self) -> float:
@@ -50,13 +54,23 @@ class SimulatedBoard(ABC):
         self._owed_ms += duration_s * 1000
         milliseconds = max(1, round(self._owed_ms))
         self._owed_ms -= milliseconds
-        self._run(milliseconds)
+        self._run_witnessed(milliseconds)
         if self._after_poll is not None:
             self._after_poll()
         data = b""
         while part := self._take():
             data += part
         return data
+
+    def _run_witnessed(self, milliseconds: int) -> None:
+        if self.witness is None:
+            self._run(milliseconds)
+            return
+        while milliseconds > 0:
+            stretch = min(milliseconds, STRETCH_MS)
+            self._run(stretch)
+            milliseconds -= stretch
+            self.witness()
 
     @abstractmethod
     def brown_out(self, dead_s: float) -> None:

@@ -5,6 +5,7 @@ Experiments get a bus and a camera. The truth goes to a file of its own.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -141,7 +142,21 @@ def board_on(
 
 
 class PlantCamera:
-    """Looks at the plant's actuator, now."""
+    """Looks at the plant's actuator: a frame that arrives shows it as it was a latency ago.
+
+    `known_s` is the latency that frames are thought to have; their time is early by that.
+    """
+
+    def __init__(
+        self, camera: VirtualCamera, plant: Plant, board: SimulatedBoard, known_s: float
+    ) -> None:
+        self._camera = camera
+        self._plant = plant
+        self._board = board
+        self._known_s = known_s
+        self._seen: deque[tuple[float, float]] = deque()
+        board.witness = self._witness
+        self._witness()
 
     @property
     def fault(self) -> CameraFault:
@@ -152,15 +167,28 @@ class PlantCamera:
     def fault(self, fault: CameraFault) -> None:
         self._camera.fault = fault
 
-    def __init__(self, camera: VirtualCamera, plant: Plant, board: SimulatedBoard) -> None:
-        self._camera = camera
-        self._plant = plant
-        self._board = board
+    @property
+    def latency_s(self) -> float:
+        """What is to be found: exposure to arrival."""
+        return self._camera.latency_s
 
     def grab(self) -> tuple[float, bytes]:
-        """Bench time in seconds and the JPEG of a frame taken now."""
-        time_s = self._board.now_s
-        return time_s, self._camera.grab(self._plant.truth().angle, time_s)
+        """Bench time in seconds, as far as it is known, and the JPEG of a frame arriving now."""
+        now_s = self._board.now_s
+        jpeg = self._camera.grab(self._angle(now_s - self.latency_s), now_s)
+        return now_s - self._known_s, jpeg
+
+    def _witness(self) -> None:
+        """Note the angle now; forget what no frame can show any more."""
+        now_s = self._board.now_s
+        self._seen.append((now_s, self._plant.truth().angle))
+        while len(self._seen) > 1 and self._seen[1][0] <= now_s - self.latency_s:
+            self._seen.popleft()
+
+    def _angle(self, time_s: float) -> float:
+        """Between two looks on the straight line; before the first, as at the first."""
+        times, angles = zip(*self._seen, strict=True)
+        return float(np.interp(time_s, times, angles))
 
 
 class VirtualBench:
@@ -200,7 +228,9 @@ class VirtualBench:
             np.random.default_rng(seeds.camera),
             side_profile,
         )
-        self.camera = PlantCamera(camera, self.plant, self._board)
+        calibrated, assumed_s = setup.calibrations.camera, setup.bench.camera.latency
+        known_s = calibrated.latency_s(assumed_s)
+        self.camera = PlantCamera(camera, self.plant, self._board, known_s)
 
     @property
     def board(self) -> SimulatedBoard:

@@ -21,16 +21,16 @@ def provenance(
     instrument: str,
     serial_number: str,
     operator: str,
-    valid_days: int,
+    valid_days: int | None,
     environment: Environment,
     simulated: bool,
     reference: str = "",
 ) -> Provenance:
-    """Who calibrated what, when and against what; counts from today."""
+    """Who calibrated what, when and against what; counts from today, without end where None."""
     today = date.today()
     return Provenance(
         date=today,
-        valid_until=today + timedelta(days=valid_days),
+        valid_until=None if valid_days is None else today + timedelta(days=valid_days),
         method=method,
         instrument=instrument,
         serial_number=serial_number,

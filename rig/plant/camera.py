@@ -45,6 +45,7 @@ class CameraStreams(NamedTuple):
     noise: np.random.Generator
     glass: np.random.Generator
     square: np.random.Generator
+    delay: np.random.Generator
 
     @classmethod
     def of(cls, rng: np.random.Generator) -> CameraStreams:
@@ -58,6 +59,10 @@ class CameraStreams(NamedTuple):
     def lean(self, optics: VirtualOptics) -> float:
         """By how many rad the legs of the bench's ruler are closer than a right angle."""
         return float(self.square.normal(0.0, optics.ruler_squareness))
+
+    def latency(self, optics: VirtualOptics) -> float:
+        """How many s after its exposure a frame arrives."""
+        return max(0.0, float(self.delay.normal(optics.latency, optics.latency_spread)))
 
 
 class SensorNoise:
@@ -96,9 +101,9 @@ class VirtualCamera:
     """A USB camera in front of the virtual bench.
 
     `rng` draws the lens, how square the ruler is, how crooked the camera stands, the direction of
-    the light, the background and the noise; the same generator state gives the same camera, and
-    the same angle and time the same picture, however many were taken before. `profile` gives the
-    actuator's outlines.
+    the light, the background, the noise and the latency, `latency_s`, which whoever asks for a
+    picture has to mind; the same generator state gives the same camera, and the same angle and time
+    the same picture, however many were taken before. `profile` gives the actuator's outlines.
     `fault` may be set at any time. Raises SceneError if actuator and ruler do not fit into the
     picture.
     """
@@ -117,6 +122,7 @@ class VirtualCamera:
         self.projection = draw_projection(lens, optics, streams.pose)
         layout = lay_out(geometry, ruler, self.projection, profile)
         self.layout = replace(layout, ruler_lean=streams.lean(optics))
+        self.latency_s = streams.latency(optics)
         self.fault = CameraFault.NONE
         self._geometry = geometry
         self._profile = profile

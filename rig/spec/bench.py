@@ -162,7 +162,11 @@ class Camera(SpecModel):
         Field(discriminator="kind"),
     ]
     latency: Duration = Field(
-        0.0, ge=0, le=2, description="from exposure to arrival, taken off a frame's time"
+        0.0,
+        ge=0,
+        le=2,
+        description="from exposure to arrival, taken off a frame's time; what the camera's "
+        "calibration has measured goes before it",
     )
     jpeg_quality: Integer = Field(92, ge=50, le=100)
     frame_rate: Frequency = Field(ge=0.1, le=1000)
@@ -339,6 +343,12 @@ class VirtualOptics(SpecModel):
     blur: Number = Field(ge=0, le=20, description="standard deviation of the point spread, pixels")
     noise: Number = Field(ge=0, le=100, description="standard deviation, grey levels of 255")
     light_gradient: Ratio = Field(ge=0, le=1, description="brightness change across the picture")
+    latency: Duration = Field(
+        0.06, ge=0, le=1, description="mean time from exposure to arrival of a frame"
+    )  # a guess: two frames at 30 a second, for reading out, USB and the driver's queue
+    latency_spread: Duration = Field(
+        0.01, ge=0, le=0.2, description="its standard deviation from camera to camera"
+    )  # a guess
 
 
 class VirtualBench(SpecModel):

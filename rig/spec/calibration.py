@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from rig.spec.base import Count, Date, Integer, Number, SpecModel, require
 from rig.spec.quantity import (
+    Duration,
     Length,
     Mass,
     Pressure,
@@ -159,8 +160,17 @@ class SyringeCalibration(Calibration):
     dead_volume_u: Volume = Field(ge=0, description="standard uncertainty")
 
 
+class CameraLatency(SpecModel):
+    """From exposure to arrival of a frame; counts as long as the camera's calibration does."""
+
+    value: Duration = Field(ge=0, le=2)
+    u: Duration = Field(ge=0, description="standard uncertainty")
+    provenance: Provenance
+    fit: Fit | None = None
+
+
 class CameraCalibration(Calibration):
-    """Pinhole and Brown-Conrady lens of the camera, pixels."""
+    """Pinhole and Brown-Conrady lens of the camera, pixels; its latency where it was measured."""
 
     instrument: Literal["camera"]
     width: Count = Field(le=20_000)
@@ -171,6 +181,11 @@ class CameraCalibration(Calibration):
     centre_y: Number
     distortion: tuple[Number, Number, Number, Number, Number] = (0.0, 0.0, 0.0, 0.0, 0.0)
     angle_u_deg: Number = Field(ge=0, description="standard uncertainty of in-plane angles, deg")
+    latency: CameraLatency | None = None
+
+    def latency_s(self, assumed_s: float) -> float:
+        """What a frame's time is early by, s; `assumed_s` where that was not measured."""
+        return assumed_s if self.latency is None else self.latency.value
 
 
 class RulerCalibration(Calibration):

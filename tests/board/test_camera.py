@@ -17,7 +17,8 @@ from rig.spec.workspace import Workspace
 
 LIBRARY = Workspace(Path(__file__).parents[2])
 CAMERA = LIBRARY.bench("virtual").camera
-MODE = LIBRARY.resolve_bench(LIBRARY.bench("virtual")).camera
+CALIBRATED = LIBRARY.resolve_bench(LIBRARY.bench("virtual")).camera
+MODE = CALIBRATED.model_copy(update={"latency": None})
 PICTURE = np.full((48, 64, 3), (10, 200, 90), np.uint8)
 
 
@@ -46,6 +47,13 @@ def test_frames_are_stamped_with_their_exposure_and_end_with_an_error(frames):
     with pytest.raises(BoardError, match="no more frames"):
         opened.grab()
     opened.close()
+
+
+def test_a_measured_latency_goes_before_that_of_the_bench(frames):
+    device = OpenCvCameraDevice(kind="opencv", source=frames)
+    opened = open_camera(camera(device, latency=0.03), CALIBRATED, lambda: 5.0)
+    assert CALIBRATED.latency.value == 0.06
+    assert opened.grab()[0] == pytest.approx(4.94)
 
 
 def test_a_camera_that_is_not_there_says_what_to_check(tmp_path):

@@ -14,6 +14,7 @@ from rig.spec.calibration import CameraCalibration, RulerCalibration
 from rig.spec.loading import read
 from rig.spec.target import CharucoTarget
 from rig.spec.workspace import Workspace
+from tests.benches import BEAM_ACTUATOR
 from tests.cli.conftest import rig  # noqa: F401
 
 SEED = 3
@@ -121,3 +122,22 @@ def test_pictures_without_a_board_are_refused(rig, tmp_path):  # noqa: F811
     assert outcome.code != 0
     assert "The board was found in 0 pictures" in outcome.err
     assert not (tmp_path / "x.yaml").exists()
+
+
+def test_a_latency_joins_the_calibration_of_the_camera(rig, tmp_path):  # noqa: F811
+    file = tmp_path / "made.yaml"
+    outcome = rig(
+        *("calibrate", "latency", "--bench", "virtual-beam", "--actuator", BEAM_ACTUATOR),
+        *("--cycles", 1, "--frames", 8, "--lag-ms", 21, "--lag-u-ms", 4, "--out", file),
+    )
+    assert outcome.code == 0, outcome.err
+    made = read(file, CameraCalibration).spec
+    space = Workspace.find()
+    known = space.resolve_bench(space.bench("virtual-beam")).camera
+    assert made.model_copy(update={"latency": None}) == known.model_copy(update={"latency": None})
+    latency = made.latency
+    assert latency.provenance.simulated
+    delay_s = latency.fit.values[latency.fit.parameters.index("delay")]
+    assert latency.value == pytest.approx(delay_s - 0.021)
+    assert 0.004 < latency.u < 0.008
+    assert f"latency {1e3 * latency.value:.1f} ms" in outcome.out

@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Protocol
 
-from rig.experiment.calibration.references import CalibrationBench, Stage
+from rig.experiment.calibration.references import Stage
 from rig.experiment.prepare import make_safe, take_over, write_parameters
+from rig.link.bus import FrameBus
 from rig.link.client import RigLink
 
 Procedure = Callable[[RigLink], None]
 
 
+class Linked(Protocol):
+    """A bench, as far as its board is concerned."""
+
+    @property
+    def bus(self) -> FrameBus:
+        """The link to the board."""
+        ...
+
+
 def calibrate_on(
-    bench: CalibrationBench,
+    bench: Linked,
     parameters: Mapping[str, float],
     procedure: Procedure,
     stage: Stage,
