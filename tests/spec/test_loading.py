@@ -221,7 +221,7 @@ def test_parts_of_a_bench_must_fit_together() -> None:
 
 def test_a_protocol_without_experiments_is_refused() -> None:
     (problem,) = complaints("kind: protocol\nname: nothing\n")
-    assert "expected 'deformation', 'blocked_force' or both" in problem
+    assert "expected 'deformation', 'blocked_force' or 'trials'" in problem
 
 
 @pytest.mark.parametrize(
