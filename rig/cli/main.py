@@ -93,13 +93,16 @@ def _discard_output() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
+_WIDTH = 100
+"""Columns that a complaint fills at most."""
+
+
 def _complain(message: str) -> None:
-    width = 100
     for index, line in enumerate(message.splitlines() or [""]):
         print(
             textwrap.fill(
                 line,
-                width,
+                _WIDTH,
                 initial_indent="rig: " if index == 0 else "     ",
                 subsequent_indent="     ",
                 break_long_words=False,

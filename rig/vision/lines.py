@@ -9,15 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.spec.student import widening
-
 FloatArray = NDArray[np.float64]
 
 HUBER_TUNING = 1.345  # 95 % efficiency on Gaussian residuals (Huber 1981)
 BISQUARE_TUNING = 4.685  # the same for Tukey's bisquare
 MAD_TO_SIGMA = 1.4826
 HUBER_STEPS, BISQUARE_STEPS = 2, 3
-MIN_CURVATURE = 0.2  # mean psi' below which half of the points are off the line
 
 
 @dataclass(frozen=True)
@@ -37,16 +34,12 @@ def fit_line(points: FloatArray, weights: FloatArray) -> LineFit:
     Huber weights come close to the line from anywhere, Tukey's bisquare then drops what is not
     on it, as where something lies across a part of the edge.
 
-    `weights` (n,) are relative prior weights. The scatter of the points is that of an M-estimate,
-    mean psi^2 / (mean psi')^2 (Huber and Ronchetti 2009, eq. 7.81): residuals whose weight was cut
-    would make it too small. Neighbouring edge points are correlated by the lens, the sensor and
-    JPEG blocks, so the number of independent points is smaller than n: see `independent_share`.
-    The uncertainty is widened so that 1.96 of it are Student's 95 % interval at the degrees of
-    freedom that are left. Needs n >= 3.
+    `weights` (n,) are relative prior weights. Neighbouring edge points are correlated by the
+    lens, the sensor and JPEG blocks, so the number of independent points is smaller than n: see
+    `independent_share`. Needs n >= 3.
     """
     robust = weights.astype(np.float64).copy()
     centre, direction, offsets = plain_line(points, robust)
-    slope = np.ones(len(points))
     scale = 0.0
     for step in range(HUBER_STEPS + BISQUARE_STEPS):
         scale = max(MAD_TO_SIGMA * median(np.abs(offsets)), 1e-4)
@@ -55,19 +48,13 @@ def fit_line(points: FloatArray, weights: FloatArray) -> LineFit:
         else:
             ratio = np.minimum(np.abs(offsets) / (BISQUARE_TUNING * scale), 1.0)
             robust = weights * (1.0 - ratio**2) ** 2
-            slope = (1.0 - ratio**2) * (1.0 - 5.0 * ratio**2)  # psi' of r (1 - r^2)^2
         centre, direction, offsets = plain_line(points, robust)
     along = (points - centre) @ direction
     total = float(robust.sum())
     variance = float((robust * offsets**2).sum()) / total * len(points) / max(len(points) - 2, 1)
     spread = float((robust * along**2).sum()) / total
-    share = weights / float(weights.mean())
-    curvature = max(float(share @ slope) / len(points), MIN_CURVATURE)
-    pulled = (robust / weights * offsets) ** 2
     independent = len(points) * independent_share(offsets)
-    dof = max(independent - 2.0, 1.0)
-    scatter = float(share @ pulled) / len(points) * independent / dof / curvature**2
-    u_direction = widening(dof) * np.sqrt(scatter / max(spread, 1e-12) / independent)
+    u_direction = np.sqrt(variance / max(spread, 1e-12) / independent)
     return LineFit(
         centre=centre,
         direction=direction,
@@ -106,13 +93,11 @@ def median(values: NDArray[Any]) -> float:
 def independent_share(offsets: FloatArray) -> float:
     """Share (1 - r) / (1 + r) of correlated residuals (n,) that count as independent.
 
-    The effective sample size of an AR(1) process. The correlation r of neighbours about a fitted
-    line comes out too small by (2 + 4 r) / n (Marriott and Pope 1954); it is taken to be between
-    0 and 0.95.
+    The effective sample size of an AR(1) process with the lag-one correlation r, which is taken
+    to be between 0 and 0.95.
     """
     energy = float(offsets @ offsets)
     if energy <= 0.0:
         return 1.0
-    lag_one = float(offsets[1:] @ offsets[:-1]) / energy
-    lag_one = min(max(lag_one + (2.0 + 4.0 * lag_one) / len(offsets), 0.0), 0.95)
+    lag_one = min(max(float(offsets[1:] @ offsets[:-1]) / energy, 0.0), 0.95)
     return (1.0 - lag_one) / (1.0 + lag_one)

@@ -31,6 +31,7 @@ def rig(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> C
     """
     monkeypatch.chdir(ROOT)
     monkeypatch.setenv("COLUMNS", "2000")
+    monkeypatch.setattr("rig.cli.main._WIDTH", 2000)
 
     def run(*arguments: str | Path) -> Outcome:
         capfd.readouterr()

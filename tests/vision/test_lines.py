@@ -48,20 +48,6 @@ def test_the_stated_direction_uncertainty_is_the_scatter_of_the_direction():
     assert np.mean([fit.u_direction_rad for fit in fits]) == pytest.approx(scatter, rel=0.25)
 
 
-@pytest.mark.parametrize("correlation", [0.0, 0.6])
-def test_the_interval_of_a_short_line_holds_its_direction(correlation):
-    """As many points as a cap of 30 px has, whose neighbours resemble each other."""
-    rng, held, trials = np.random.default_rng(4), 0, 800
-    for _ in range(trials):
-        noise = rng.normal(0.0, 0.2, 26)
-        for i in range(1, 26):
-            noise[i] = correlation * noise[i - 1] + np.sqrt(1 - correlation**2) * noise[i]
-        points = np.stack([np.arange(26.0), noise], axis=1)
-        fit = fit_line(points, np.ones(26))
-        held += abs(np.radians(misses(fit, 0.0))) < 1.96 * fit.u_direction_rad
-    assert 0.92 < held / trials < 0.985
-
-
 def test_correlated_scatter_claims_a_larger_uncertainty():
     rng = np.random.default_rng(2)
     white = rng.normal(0, 0.1, 100)
