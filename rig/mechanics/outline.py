@@ -61,8 +61,7 @@ def _does_not_bend(geometry: Geometry) -> MechanicsError:
 def _row_profile(row: ChamberRow, angle: float) -> SideProfile:
     """A row of chambers bent to an arc about its underside, sections plane."""
     floor = row.layer or min(s.cavity.low for s in row.segments if s.cavity) - row.underside
-    near = row.start
-    top = max(s.outline.high for s in row.segments) - row.underside
+    near, top = row.start, row.height
     steps = [np.array([near, 0.0])]
     for x, segment in zip(row.starts(), row.segments, strict=False):
         height = segment.outline.high - row.underside

@@ -41,7 +41,7 @@ class Peak:
     at_notch: bool
     """Whether it is in an element at a singular edge: then it has no limit on finer meshes."""
     bulk: float
-    """Value at quadrature points that 99.5 % of the volume stays below; of all solids."""
+    """Value at quadrature points that 99.5 % of the volume stays below; of all solids asked for."""
 
 
 @dataclass(frozen=True)
@@ -66,10 +66,13 @@ PEAKS = tuple(field.name for field in fields(Extremes) if field.name != "pressur
 """Names of the peaks in Extremes."""
 
 
-def summarise(model: Model, solution: Solution) -> Extremes:
-    """Largest stresses and strains of a model at one of its solutions."""
-    inside = all_point_fields(model, solution.state)
-    outside = [recovered(s, at) for s, at in zip(model.solids, inside, strict=True)]
+def summarise(model: Model, solution: Solution, solids: int | None = None) -> Extremes:
+    """Largest stresses and strains of a model at one of its solutions.
+
+    Of its first `solids` solids, or of all: what is of another material has a strength of its own.
+    """
+    inside = all_point_fields(model, solution.state)[:solids]
+    outside = [recovered(s, at) for s, at in zip(model.solids[:solids], inside, strict=True)]
     nodes, near = model.discretisation.nodes, near_notches(model)
     volumes = np.concatenate([fields.weights.reshape(-1) for fields in inside])
 

@@ -129,7 +129,8 @@ def _entry_of(
     actuator: ActuatorModel, solutions: tuple[Solution, ...], failure: str | None, cancelled: bool
 ) -> Entry:
     states = [s.state for s in solutions]
-    found = [summarise(actuator.model, s) for s in solutions]
+    # the first solid is of the actuator's material, whose strength they are compared with
+    found = [summarise(actuator.model, s, solids=1) for s in solutions]
     measured = [actuator.measures(s) for s in solutions]
     peaks = [[getattr(extremes, name) for name in PEAKS] for extremes in found]
     return {
