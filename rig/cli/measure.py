@@ -11,7 +11,7 @@ import typer
 from rig.cli.app import app
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from rig.cli._gauges import Gauge, Reading
     from rig.vision.footage import Frame
@@ -97,6 +97,7 @@ def measure(
     With lens and plane taken out:
     `rig measure run.mp4 --camera calibration/camera.yaml --ruler calibration/ruler.yaml`
     """
+    from rig.cli._tables import write_csv
     from rig.vision.errors import VisionError
     from rig.vision.footage import expand
     from rig.vision.table import header
@@ -121,9 +122,9 @@ def measure(
     if quantity is not Quantity.ANGLE:
         _show_budget(rows, readings)
     if csv is not None:
-        _write(csv, header(gauge.columns), [row.cells(gauge.columns) for row in rows])
+        write_csv(csv, header(gauge.columns), [row.cells(gauge.columns) for row in rows])
     if budget is not None:
-        _write(budget, BUDGET_HEADER, _budget_lines(rows, readings))
+        write_csv(budget, BUDGET_HEADER, _budget_lines(rows, readings))
     good = {row.file for row in rows if row.accepted}
     bad = [file for file in files if file not in good]
     if bad:
@@ -348,20 +349,3 @@ def _save(path: Path, image: Image) -> None:
         path.write_bytes(cv2.imencode(".png", image)[1].tobytes())
     except OSError as error:
         raise VisionError(f"{path} cannot be written: {error.strerror}.") from None
-
-
-def _write(path: Path, header: Sequence[str], lines: Iterable[Sequence[str]]) -> None:
-    import csv
-
-    from rig.vision.errors import VisionError
-
-    try:
-        with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(header)
-            writer.writerows(lines)
-    except OSError as error:
-        raise VisionError(
-            f"The table cannot be written to {path}: {error.strerror}. Name a file in an existing "
-            "folder that you may write to."
-        ) from None

@@ -83,9 +83,10 @@ def predict(
     from rich.console import Console
 
     from rig.cli._calculation import calculating
+    from rig.cli._tables import write_csv
     from rig.mechanics.errors import MechanicsError
     from rig.mechanics.model import predict as predict_response
-    from rig.mechanics.table import rows
+    from rig.mechanics.table import COLUMNS, rows
     from rig.spec.loading import load_actuator
     from rig.spec.workspace import Workspace
 
@@ -122,7 +123,7 @@ def predict(
     for line in cautions:
         typer.echo(line, err=True)
     if csv is not None:
-        _write(csv, table)
+        write_csv(csv, COLUMNS, _lines(table))
     if unreached:
         raise MechanicsError("\n".join(shortfalls))
     for line in shortfalls:
@@ -215,23 +216,9 @@ def _show(actuator: str, material: str, table: list[Row]) -> None:
     Console().print(shown)
 
 
-def _write(path: Path, table: list[Row]) -> None:
-    import csv
-
-    from rig.mechanics.errors import MechanicsError
-    from rig.mechanics.table import COLUMNS
-
-    try:
-        with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(COLUMNS)
-            for model, *values in table:
-                writer.writerow([model, *("" if v is None else f"{v:.10g}" for v in values)])
-    except OSError as error:
-        raise MechanicsError(
-            f"the table cannot be written to {path}: {error.strerror}. Name a file in an "
-            f"existing folder that you may write to."
-        ) from None
+def _lines(table: list[Row]) -> Iterator[tuple[str, ...]]:
+    for model, *values in table:
+        yield model, *("" if v is None else f"{v:.10g}" for v in values)
 
 
 def _margins(spec: ActuatorSpec, material: MaterialSpec, top: float, job: Job) -> list[str]:
