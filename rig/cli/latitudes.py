@@ -56,14 +56,17 @@ def latitudes(
     """
     from rich.console import Console
 
+    from rig.cli._tables import write_csv
     from rig.mechanics.simulate.latitudes import COMPRESSION, INFLATION, Drive, drive
     from rig.spec.loading import load_actuator
     from rig.spec.workspace import Workspace
+    from rig.validate.agreement import pingouin
 
     spec = load_actuator(actuator)
     material = Workspace.find(actuator).material(spec.material)
     geometry = _joint(spec)
     most = None if fold is None else _fold_length(fold, geometry)
+    pingouin()  # missing, it is told before minutes of finite elements
     strokes = {StrokeName.INFLATION: INFLATION, StrokeName.COMPRESSION: COMPRESSION}
     lines: list[tuple[str, ...]] = []
     for name in dict.fromkeys(stroke or tuple(StrokeName)):
@@ -73,10 +76,11 @@ def latitudes(
                 runs[how.value] = drive(geometry, material, strokes[name], how)
             lines += _rows(name, how, runs[how.value])
         _show(f"{spec.name}, {material.name}: {name}, von Mises stress in MPa", runs)
+    # before the fold, which may not get there
+    if csv is not None:
+        write_csv(csv, CSV_COLUMNS, lines)
     if most is not None:
         _show_fold(f"one of many bellows, {material.name}, pressed", geometry, material, most)
-    if csv is not None:
-        _write(csv, lines)
 
 
 def _fold_length(text: str, geometry: BellowJointGeometry) -> float:
@@ -181,20 +185,3 @@ def _rows(name: str, how: str, run: LatitudeRun) -> list[tuple[str, ...]]:
         for b in range(greatest.shape[1])
         for k, letter in enumerate(LETTERS)
     ]
-
-
-def _write(path: Path, lines: list[tuple[str, ...]]) -> None:
-    import csv
-
-    from rig.mechanics.errors import MechanicsError
-
-    try:
-        with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(CSV_COLUMNS)
-            writer.writerows(lines)
-    except OSError as error:
-        raise MechanicsError(
-            f"the table cannot be written to {path}: {error.strerror}. Name a file in an "
-            "existing folder that you may write to."
-        ) from None

@@ -70,7 +70,7 @@ def intraclass_correlation(ratings: ArrayLike) -> Intraclass:
     import pandas as pd
 
     rows = pd.DataFrame({"target": target.ravel(), "rater": rater.ravel(), "rating": table.ravel()})
-    found = _pingouin().intraclass_corr(rows, "target", "rater", "rating").set_index("Type")
+    found = pingouin().intraclass_corr(rows, "target", "rater", "rating").set_index("Type")
     row = found.loc[_AGREEMENT]
     low, high = row["CI95"]
     return Intraclass(float(row["ICC"]), float(low), float(high), float(row["pval"]))
@@ -110,7 +110,8 @@ def _finite(*tables: Array) -> None:
         raise ValidateError("expected finite numbers; leave out points that were not measured.")
 
 
-def _pingouin() -> Any:
+def pingouin() -> Any:
+    """The library of intraclass correlation; raises ValidateError where it is not installed."""
     try:
         return importlib.import_module("pingouin")
     except ImportError as error:

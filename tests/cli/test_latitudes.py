@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import csv
+import sys
 
+import numpy as np
 import pytest
 
+from rig.mechanics.errors import MechanicsError
 from rig.spec.workspace import library_root
 
 ACTUATORS = library_root() / "models/actuators"
@@ -49,3 +52,49 @@ def test_a_fold_that_is_none_is_refused_before_anything_is_computed(rig, short, 
     found = rig("latitudes", "--actuator", short, "--fold", text)
     assert found.code == 2
     assert why in found.err
+
+
+def test_a_missing_library_is_told_before_anything_is_computed(rig, short, monkeypatch) -> None:
+    from rig.mechanics.simulate import latitudes
+
+    monkeypatch.setitem(sys.modules, "pingouin", None)
+    monkeypatch.setattr(latitudes, "drive", lambda *_: pytest.fail("it computes"))
+    found = rig("latitudes", "--actuator", short)
+    assert found.code == 1
+    assert "pip install pingouin" in found.err
+
+
+@pytest.fixture
+def made_up(monkeypatch) -> None:
+    """A stroke of numbers, without finite elements."""
+    from rig.mechanics.simulate import latitudes
+
+    pytest.importorskip("pingouin", reason="pingouin is not installed")
+    even, stress = np.linspace(0.0, 1.0, 4), np.random.default_rng(1).random((4, 2, 3, 10))
+    run = latitudes.LatitudeRun(even, even, even, np.full(4, np.inf), stress, np.zeros(4))
+    monkeypatch.setattr(latitudes, "drive", lambda *_: run)
+
+
+@pytest.mark.usefixtures("made_up")
+def test_the_file_is_there_even_if_the_fold_cannot_be_finished(
+    rig, short, tmp_path, monkeypatch
+) -> None:
+    from rig.mechanics.simulate import folding
+
+    def refused(*_: object) -> None:
+        raise MechanicsError("a bellow cannot be folded by 2 mm")
+
+    monkeypatch.setattr(folding, "fold", refused)
+    file = tmp_path / "weak.csv"
+    found = rig("latitudes", "--actuator", short, "--fold", "2 mm", "--csv", file)
+    assert found.code == 1
+    assert "cannot be folded" in found.err
+    assert len(file.read_text(encoding="utf-8").splitlines()) == 1 + 2 * 2 * 2 * 3 * 10
+
+
+@pytest.mark.usefixtures("made_up")
+def test_a_file_that_cannot_be_written_is_named(rig, short, tmp_path) -> None:
+    file = tmp_path / "nowhere" / "weak.csv"
+    found = rig("latitudes", "--actuator", short, "--csv", file)
+    assert found.code == 1
+    assert f"cannot be written to {file}" in found.err
