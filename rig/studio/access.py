@@ -113,7 +113,7 @@ class Access:
 
     def _foreign(self, asked: Asked) -> str | None:
         if asked.origin is not None:
-            if urlsplit(asked.origin).netloc != asked.host:
+            if _netloc(asked.origin) != asked.host:
                 return "Another site's page asked for this; the studio answers its own pages only."
             return None
         if asked.is_websocket:
@@ -133,6 +133,13 @@ def is_loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return False
+
+
+def _netloc(origin: str) -> str:
+    try:
+        return urlsplit(origin).netloc
+    except ValueError:
+        return ""
 
 
 def _name_and_port(host: str) -> tuple[str, int | None]:

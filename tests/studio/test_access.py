@@ -50,6 +50,7 @@ def test_a_foreign_name_that_resolves_here_is_refused(host: str | None) -> None:
         replace(SOCKET, origin="http://evil.example"),
         replace(SOCKET, origin="http://127.0.0.1:9999"),
         replace(SOCKET, origin="null"),
+        replace(SOCKET, origin="http://["),
         replace(SOCKET, origin=None),
         replace(PAGE, method="POST", origin="http://evil.example"),
         replace(PAGE, method="POST", fetch_site="cross-site"),

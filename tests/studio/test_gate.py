@@ -61,6 +61,15 @@ def test_a_foreign_page_can_post_nothing() -> None:
     assert client(LOCAL).post("/spec", content=b"x", headers={"origin": HERE}).json() == 1
 
 
+def test_what_the_browser_says_of_a_request_reaches_the_decision() -> None:
+    foreign = {"sec-fetch-site": "cross-site"}
+    assert client(LOCAL).post("/spec", content=b"x", headers=foreign).status_code == 403
+    assert client(LOCAL).get("/", headers=foreign).status_code == 403
+    link = {**foreign, "sec-fetch-mode": "navigate"}
+    assert client(LOCAL).get("/", headers=link).status_code == 200
+    assert client(LOCAL).get("/", headers={"host": "evil.example:8137"}).status_code == 421
+
+
 def test_a_foreign_page_opens_no_websocket() -> None:
     for headers in ({"origin": "http://evil.example"}, {}):
         with (
