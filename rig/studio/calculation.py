@@ -9,6 +9,7 @@ from __future__ import annotations
 import multiprocessing
 import pickle
 import signal
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -47,6 +48,7 @@ class Calculation:
         )
         self._process.start()
         said.close()  # so that its end is noticed here
+        self._polling = threading.Lock()
         self._asked_to_stop_s: float | None = None
         self.status: Status = "running"
         self.progress = "starting"
@@ -54,7 +56,12 @@ class Calculation:
         self.error = ""
 
     def poll(self) -> Status:
-        """Take in what the worker said; returns the status."""
+        """Take in what the worker said; returns the status. Any thread may ask."""
+        with self._polling:
+            self._take_in()
+        return self.status
+
+    def _take_in(self) -> None:
         while self.status == "running" and self._heard.poll():
             try:
                 said: _Said = self._heard.recv()
@@ -77,7 +84,6 @@ class Calculation:
         ):
             self._process.terminate()
             self._end("cancelled")
-        return self.status
 
     def cancel(self) -> None:
         """Ask the worker to stop after its current step."""

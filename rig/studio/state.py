@@ -19,7 +19,7 @@ from rig.studio.works import report
 
 MOST_CALCULATIONS = 2
 MOST_VIEWS = 12
-"""Computed pages that are kept; the one shown longest ago goes first."""
+"""Computed pages that are kept; the oldest goes first."""
 
 
 class Workshop:
@@ -30,7 +30,7 @@ class Workshop:
 
     def start(self, work: Callable[..., Any], *arguments: Any) -> Calculation:
         """Begin; raises StudioError while enough is being computed."""
-        self._running = [c for c in self._running if c.status == "running"]
+        self._running = [c for c in self._running if c.poll() == "running"]
         if len(self._running) >= MOST_CALCULATIONS:
             raise StudioError(
                 f"{MOST_CALCULATIONS} calculations are going on already: wait for one or cancel it."
