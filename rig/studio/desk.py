@@ -114,6 +114,11 @@ class Desk:
         """Whether a bench is connected, or being so."""
         return self._thread is not None and self._thread.is_alive()
 
+    def take_control(self, session: str) -> None:
+        """Sit down at the bench; raises StudioError while another session sits there."""
+        self._miss_the_lost()  # without a bench nobody else looks who is gone
+        self.seat.take(session)
+
     def connect(self, session: str, choice: Choice) -> None:
         """Open a bench; raises StudioError, SpecError, LimitError or ExperimentError."""
         self.seat.require(session)
@@ -272,15 +277,20 @@ class Desk:
 
     def _must_vent(self) -> bool:
         """Whether somebody pressed Vent, or whoever controls the bench is gone."""
-        if self.seat.lapsed():
-            self._say(said=LOST)
-            self._vent.set()
+        self._miss_the_lost()
         if not self._vent.is_set():
             return False
         self._vent.clear()
         while self._next_order() is not None:
             pass  # what was asked for before is not done after it
         return True
+
+    def _miss_the_lost(self) -> None:
+        """Free the seat of a browser that is gone, and see to it that its bench is vented."""
+        if self.seat.lapsed():
+            if self.is_open:
+                self._say(said=LOST)
+            self._vent.set()
 
     def _carry_out(self, link: RigLink, opcode: str, argument: float = 0.0) -> None:
         try:

@@ -65,7 +65,7 @@ def until(condition: Callable[[], bool]) -> None:
 
 
 def connected(desk: Desk, choice: Choice = BEAM) -> None:
-    desk.seat.take("me")
+    desk.take_control("me")
     desk.connect("me", choice)
     until(lambda: desk.scope.reading().state == "idle" and not desk.activity.doing)
 
@@ -105,6 +105,19 @@ def test_a_browser_that_falls_silent_leaves_a_vented_bench_and_a_free_seat(
     assert desk.seat.holder is None
     with pytest.raises(StudioError, match="take control first"):
         desk.order("me", "home")
+
+
+def test_a_browser_that_is_gone_without_a_bench_does_not_keep_the_seat(
+    desk: Desk, clock: Clock
+) -> None:
+    desk.take_control("gone")
+    clock.now_s += PATIENCE_S
+    with pytest.raises(StudioError, match="another browser controls"):
+        desk.take_control("next")
+    clock.now_s += 0.1
+    desk.take_control("next")
+    assert desk.seat.holder == "next"
+    assert desk.activity.said == ""
 
 
 def test_giving_control_back_vents(desk: Desk) -> None:

@@ -66,7 +66,7 @@ class BenchPage:
             heading("Control")
             ui.html('<p>Control is <b data-live="control">unknown</b>.</p>', sanitize=False)
             with ui.row().classes("actions"):
-                self._button("Take control", lambda s: self._desk.seat.take(s), "main")
+                self._button("Take control", self._desk.take_control, "main")
                 self._button("Give back", self._desk.release)
             self._actuator = self._names("actuator")
             self._bench = self._names("bench")
