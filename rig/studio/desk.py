@@ -124,6 +124,8 @@ class Desk:
         self.seat.require(session)
         if self.is_open:
             raise StudioError("a bench is connected already: disconnect it first.")
+        if choice.seed < 0:
+            raise StudioError("a seed is 0 or more.")
         setup = self._setup_of(choice, "default")
         request = make_request(setup, choice.seed)
         if not setup.bench.simulated:
@@ -154,12 +156,12 @@ class Desk:
         self._require_free()
         assert self._setup is not None
         if opcode == "set_pressure":
-            if argument < 0:
+            if not argument >= 0:
                 raise StudioError("a set-point is 0 kPa or more.")
             check_pressure(
                 "this set-point", argument * 1e3, self._setup.actuator, self._setup.bench
             )
-        if opcode == "jog" and abs(argument) > JOG_ML_S:
+        if opcode == "jog" and not abs(argument) <= JOG_ML_S:
             raise StudioError(f"jogging goes at {JOG_ML_S:g} mL/s at most.")
         self._say(said="")
         self._orders.put(_Order(opcode, argument))
@@ -281,9 +283,13 @@ class Desk:
         if not self._vent.is_set():
             return False
         self._vent.clear()
-        while self._next_order() is not None:
-            pass  # what was asked for before is not done after it
+        self._drop_orders()
         return True
+
+    def _drop_orders(self) -> None:
+        """What was asked for before is not done after it."""
+        while self._next_order() is not None:
+            pass
 
     def _miss_the_lost(self) -> None:
         """Free the seat of a browser that is gone, and see to it that its bench is vented."""
@@ -301,9 +307,10 @@ class Desk:
     def _run(self, choice: Choice, protocol: str) -> None:
         """Take a run on a bench of its own, as `rig characterise` does."""
         try:
+            self._say(doing="opening the bench for the run", said="")
+            self._drop_orders()
             setup = self._setup_of(choice, protocol)
             request = make_request(setup, choice.seed)
-            self._say(doing="opening the bench for the run", said="")
             stem = f"{setup.actuator.name}-{setup.bench.name}-seed{choice.seed}"
             folder = first_free(self.workspace.logs / stem)
             bench = self._open(choice, request, folder)
@@ -311,13 +318,19 @@ class Desk:
                 outcome = new_run(folder, bench, request, _Watcher(self._say), self._interrupted)
             finally:
                 bench.close()
-            self.after_run(folder)
             told = f"{outcome.stop.exit_status}: {outcome.stop.reason}"
             self._say(said=f"The run {folder.name} ended: {told}")
+            self._follow_up(folder)
         except RigError as error:
             self._say(said=str(error))
         finally:
             self._say(doing="", done=0, total=0, question="")
+
+    def _follow_up(self, folder: Path) -> None:
+        try:
+            self.after_run(folder)
+        except StudioError as error:
+            self._say(said=f"{self.activity.said} Its report was not begun: {error}")
 
     def _interrupted(self) -> None:
         if self._must_vent() or self._leave.is_set():

@@ -6,6 +6,7 @@ import json
 import shutil
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,9 @@ from fastapi import FastAPI
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
+from rig.experiment.bench import Bench
 from rig.experiment.errors import LimitError
+from rig.link.client import RigLink
 from rig.record.reader import RunReader
 from rig.spec.workspace import Workspace, library_root
 from rig.studio.desk import LOST, Choice, Desk
@@ -149,6 +152,10 @@ def test_a_set_point_beyond_a_limit_never_reaches_the_board(desk: Desk) -> None:
         desk.order("me", "set_pressure", -1.0)
     with pytest.raises(StudioError, match="mL/s at most"):
         desk.order("me", "jog", 3.0)
+    with pytest.raises(StudioError, match="0 kPa or more"):
+        desk.order("me", "set_pressure", float("nan"))
+    with pytest.raises(StudioError, match="mL/s at most"):
+        desk.order("me", "jog", float("nan"))
 
 
 def test_what_the_board_refuses_is_said_in_its_words(desk: Desk) -> None:
@@ -165,6 +172,8 @@ def test_only_names_of_the_workspace_are_opened(desk: Desk) -> None:
     ):
         with pytest.raises(StudioError, match="of this workspace"):
             desk.connect("me", choice)
+    with pytest.raises(StudioError, match="seed is 0 or more"):
+        desk.connect("me", replace(BEAM, seed=-1))
     connected(desk)
     with pytest.raises(StudioError, match="protocol of this workspace"):
         desk.take("me", "../protocols/tiny")
@@ -184,6 +193,30 @@ def test_a_run_is_recorded_as_from_the_command_line_and_the_bench_comes_back(des
     assert len(reader.points()) == 2
     assert desk.picture.startswith(b"\xff\xd8")
     until(lambda: desk.scope.reading().state == "idle")
+
+
+def test_what_is_asked_for_while_a_run_begins_is_not_done_after_it(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left: list[int] = []
+    let_go = desk._let_go
+
+    def pressed_once_more(link: RigLink, bench: Bench) -> None:
+        monkeypatch.undo()
+        desk.order("me", "set_pressure", 4.0)
+        let_go(link, bench)
+
+    def refuse(_folder: Path) -> None:
+        left.append(desk._orders.qsize())
+        raise StudioError("enough is going on.")
+
+    desk.after_run = refuse
+    connected(desk, replace(BEAM, speed=0.0))
+    monkeypatch.setattr(desk, "_let_go", pressed_once_more)
+    desk.take("me", "tiny")
+    until(lambda: "Its report was not begun: enough" in desk.activity.said)
+    assert "success" in desk.activity.said
+    assert left == [0]
 
 
 def test_vent_stops_a_run_and_its_log_says_so(desk: Desk) -> None:
