@@ -43,7 +43,7 @@ def fluid_parameters(bench: BenchSpec, pneumatics: VirtualPneumatics) -> dict[st
         "ambient_temperature": ambient.temperature,
         "liquid": liquid is not None,
         "molar_mass": AIR_MOLAR_MASS,
-        "density": liquid.density if liquid else _air_density(bench),
+        "density": _fluid_density(bench),
         "viscosity": viscosity,
         "bulk_modulus": liquid.bulk_modulus if liquid else 0.0,
         "entrained_air": liquid.entrained_air if liquid else 0.0,
@@ -104,10 +104,9 @@ def actuator_parameters(
         own = [(term.share, term.time) for term in variation.more_creep]
         terms = [(specimen.creep_share, specimen.creep_time), *own, *terms][:CREEP_TERMS]
     mullins = variation.mullins if specimen else None
-    density = bench.fluid.density if isinstance(bench.fluid, Liquid) else _air_density(bench)
     inertia = 0.0
     if specimen is not None and variation.inertia:
-        inertia = shape_inertia(specimen, pressure_limit, density)
+        inertia = shape_inertia(specimen, pressure_limit, _fluid_density(bench))
     return {
         "full_pressure": pressure_limit,
         "response_time": variation.response_time,
@@ -153,7 +152,9 @@ def sensor_parameters(
     }
 
 
-def _air_density(bench: BenchSpec) -> float:
-    """In kg/m3."""
+def _fluid_density(bench: BenchSpec) -> float:
+    """In kg/m3, at ambient pressure and temperature."""
+    if isinstance(bench.fluid, Liquid):
+        return bench.fluid.density
     moles = bench.ambient.pressure / (GAS_CONSTANT * bench.ambient.temperature)
     return float(moles * AIR_MOLAR_MASS)

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from rig.mechanics.bellow import BellowShape
 from rig.plant.inertia import moment_of_inertia, shape_inertia
 from rig.plant.instruments import Instruments
-from rig.plant.parameters import drive_parameters
+from rig.plant.parameters import actuator_parameters, drive_parameters
 from rig.plant.plant import Faults, Fixture, Plant, plant_parameters
 from rig.plant.specimen import draw_specimen
 from rig.spec.bench import BeamSpecimen, BenchSpec
@@ -282,7 +282,8 @@ def test_the_motor_of_the_default_bench_has_torque_to_spare() -> None:
 
 
 def test_a_heavier_fluid_slows_the_bending() -> None:
-    setup = Workspace(Path(__file__).resolve().parents[2]).setup("bellow-bending", "virtual-beam")
+    workspace = Workspace(Path(__file__).resolve().parents[2])
+    setup = workspace.setup("bellow-bending", "virtual-beam")
     assert setup.bench.virtual is not None
     rng = np.random.default_rng(1)
     specimen = draw_specimen(setup.actuator, setup.material, setup.bench.virtual.specimen, rng)
@@ -302,6 +303,10 @@ def test_a_heavier_fluid_slows_the_bending() -> None:
         assert moment_of_inertia(specimen, density) == pytest.approx(2 * energy(density), rel=1e-5)
     dry, wet = (shape_inertia(specimen, 12e3, density) for density in (1.2, 998.0))
     assert 5 < 1 / (2 * np.pi * np.sqrt(wet)) < 1 / (2 * np.pi * np.sqrt(dry)) < 15
+    for bench, inertia in ((setup.bench, dry), (workspace.bench("virtual-water"), wet)):
+        assert bench.virtual is not None
+        found = actuator_parameters(bench, bench.virtual.specimen, specimen, 12e3)
+        assert found["shape_inertia"] == pytest.approx(inertia, rel=1e-3)
 
 
 def test_a_liquid_bench_has_no_feed_forward_of_a_gas() -> None:
