@@ -62,6 +62,18 @@ def test_the_volume_of_a_bellow_is_counted_by_hand():
     assert 1e9 * ChamberRow.of(one).cavity_volume == pytest.approx(by_hand)
 
 
+def test_walls_gaps_and_fibres_are_read_off_the_drawing():
+    """In mm: the roof of chambers over the underside, the thinnest wall, between neighbours."""
+    row, hybrid, block = (ChamberRow.of(g) for g in (BELLOWS, HYBRID, BLOCK))
+    assert 1e3 * row.fibre_distance == pytest.approx(16)
+    assert 1e3 * block.fibre_distance == pytest.approx(0.75 + 7 + 8)
+    assert 1e3 * row.wall == pytest.approx(1.2)
+    assert 1e3 * block.wall == pytest.approx(2)
+    assert 1e3 * row.gap == pytest.approx(5)
+    assert 1e3 * hybrid.gap == pytest.approx(1)
+    assert block.gap == 0.0
+
+
 @pytest.mark.parametrize("geometry", EVERY)
 def test_meshes_fill_the_body_and_close_the_cavity(geometry):
     row = ChamberRow.of(geometry)
@@ -129,6 +141,8 @@ def test_the_straight_outline_has_the_area_of_the_side(geometry):
     shown = side_profile(geometry, 0.0)
     side = sum(s.length * (s.outline.high - s.outline.low) for s in row.segments)
     assert shoelace(shown.bellow) + shoelace(shown.bottom_layer) == pytest.approx(side, rel=1e-9)
+    floor = 0.75e-3 if geometry is BLOCK else 1e-3
+    assert shoelace(shown.bottom_layer) == pytest.approx(floor * row.end, rel=1e-9)
     assert bending_shape(geometry) == row
 
 

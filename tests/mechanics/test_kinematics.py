@@ -21,6 +21,13 @@ LONGEST = BellowRectangularGeometry(family="bellow-rectangular")
 ROW = BellowRow.of(LONGEST)
 
 
+def test_a_row_has_the_dimensions_of_its_actuator():
+    """5 mm bellow, two faces of 1.2 mm and 5 mm spacer; h is half of 18 mm."""
+    assert ROW.number == 9
+    assert 1e3 * ROW.pitch == pytest.approx(12.4)
+    assert 1e3 * ROW.height == pytest.approx(9)
+
+
 @given(st.floats(1e-5, 1e-2))
 def test_both_arcs_have_one_centre(extension):
     """Eqs. (1) to (3): arcs of N x and N (x + x_e) over one angle, h apart."""

@@ -82,3 +82,22 @@ def test_a_stroke_that_cannot_be_finished_is_refused_with_where_it_ended(monkeyp
     monkeypatch.setattr(latitudes, "_OPTIONS", Options(iterations=2, least_step=1.0))
     with pytest.raises(MechanicsError, match="does not get to -9 mm, deformed: the path stopped"):
         drive(GEOMETRY, EVA, Stroke(-9e-3, 1.0), Drive.DEFORMED, steps=1, resolution=COARSE)
+
+
+def test_gas_that_turns_back_on_the_way_is_refused(monkeypatch) -> None:
+    found = run(INFLATION, Drive.PUMPED)
+    area = np.pi * (4.35e-3 - 0.15e-3) ** 2
+    volume = BELLOWS * 3e-3 * area + area * found.elongation
+    # so far below the pressure inside that gas first falls with the growing volume, then grows
+    growth = np.gradient(found.pressure * volume, volume)
+    monkeypatch.setattr(latitudes, "AMBIENT", -float(growth[3]))
+    with pytest.raises(MechanicsError, match="the gas in the cavity turns back"):
+        drive(GEOMETRY, EVA, INFLATION, Drive.PUMPED, steps=6, resolution=COARSE)
+
+
+def test_flanks_are_watched_from_rest_on_until_they_pass_through_each_other() -> None:
+    drawn, pressed = (run(s, Drive.DEFORMED).gap for s in (INFLATION, COMPRESSION))
+    assert 0.0 < pressed[0] < GEOMETRY.pitch - GEOMETRY.wall_thickness
+    assert np.all(np.diff(pressed) < 0)
+    assert pressed[-1] < 0.0
+    assert np.all(drawn[1:] > drawn[0])

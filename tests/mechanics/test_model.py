@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -13,10 +14,14 @@ from hypothesis import strategies as st
 
 from rig.cli.main import main
 from rig.mechanics.beam import BeamTheory
+from rig.mechanics.cad.parts import parts_of
 from rig.mechanics.errors import MechanicsError
 from rig.mechanics.model import available_models, predict
 from rig.mechanics.response import Response
+from rig.mechanics.simulate.families import FAMILIES
 from rig.mechanics.table import COLUMNS, rows
+from rig.spec.actuator import Geometry
+from rig.spec.workspace import Workspace, library_root
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 DEFAULT = Path(__file__).parents[1] / "specs/bellow-bending.yaml"  # beam theory alone
@@ -44,6 +49,19 @@ def test_an_unknown_model_is_told_which_there_are(default_actuator, agilus30):
     assert available_models("bellow-bending") == ("beam", "fe")
     with pytest.raises(MechanicsError, match=r"no model 'shell'.*has: beam, fe\."):
         predict(default_actuator, agilus30, "shell", [0.0, 1e3])
+
+
+def test_every_family_has_all_that_a_family_needs():
+    """A registry that a new family was left out of answers with a KeyError, not with a sentence."""
+    tags = {
+        get_args(g.model_fields["family"].annotation)[0] for g in get_args(get_args(Geometry)[0])
+    }
+    assert {f for f in tags if "fe" in available_models(f)} == tags == set(FAMILIES)
+    library = Workspace(library_root(), is_library=True)
+    shipped = [library.actuator(p.stem) for p in (library_root() / "models/actuators").glob("*")]
+    assert {spec.geometry.family for spec in shipped} == tags
+    for spec in shipped:
+        assert any(part.is_soft for part in parts_of(spec.geometry))
 
 
 @pytest.mark.parametrize(

@@ -47,6 +47,13 @@ def test_what_stays_elastic_returns_and_what_flows_stays_longer() -> None:
     assert plastic[1] > 0.05 * elastic[0]
 
 
+def test_elongation_is_read_at_the_upper_disc_s_rim() -> None:
+    actuator = joint_model(SHORT, EVA, resolution=COARSE)
+    rim = actuator.model.discretisation.nodes[actuator.top]
+    # a radius of 3 mm and half a wall; two bellows of 3 mm and a disc of 1 mm
+    np.testing.assert_allclose(rim, (3.15e-3, 7e-3), rtol=1e-12)
+
+
 def test_a_stored_plastic_run_goes_on_where_it_ended(tmp_path) -> None:
     """The rungs beyond those stored are computed from the history kept beside them."""
     build = partial(joint_model, SHORT, weak(2.5e6), resolution=COARSE)
