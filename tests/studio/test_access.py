@@ -80,6 +80,15 @@ def test_a_server_on_the_network_asks_for_the_token_s_cookie() -> None:
     assert not LOCAL.takes("")
 
 
+def test_a_server_at_one_address_of_the_network_is_asked_for_by_it_or_from_here() -> None:
+    one = Access.checked("10.0.0.7", 8137, TOKEN)
+    for host in ("10.0.0.7:8137", "localhost:8137"):
+        assert one.refusal(replace(PAGE, host=host, proof=one.proof)) is None
+    refusal = one.refusal(replace(PAGE, host="evil.example:8137", proof=one.proof))
+    assert refusal is not None
+    assert refusal.status == HTTPStatus.MISDIRECTED_REQUEST
+
+
 def test_the_cookie_does_not_tell_the_token() -> None:
     assert OPEN.proof is not None
     assert TOKEN not in OPEN.proof

@@ -15,7 +15,7 @@ from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
 from rig.experiment.bench import Bench
-from rig.experiment.errors import LimitError
+from rig.experiment.errors import ExperimentError, LimitError
 from rig.link.client import RigLink
 from rig.record.reader import RunReader
 from rig.spec.workspace import Workspace, library_root
@@ -121,6 +121,42 @@ def test_a_browser_that_is_gone_without_a_bench_does_not_keep_the_seat(
     desk.take_control("next")
     assert desk.seat.holder == "next"
     assert desk.activity.said == ""
+
+
+def test_disconnecting_leaves_a_vented_bench(desk: Desk) -> None:
+    pressurised(desk)
+    desk.disconnect("me")
+    assert not desk.is_open
+    assert vented(desk)
+
+
+def test_orders_that_wait_are_not_done_after_a_vent(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    connected(desk)
+    done: list[str] = []
+    carry_out = desk._carry_out
+
+    def noted(link: RigLink, opcode: str, argument: float = 0.0) -> None:
+        done.append(opcode)
+        if opcode == "hold":
+            desk.order("me", "tare")
+            desk.vent()
+        carry_out(link, opcode, argument)
+
+    monkeypatch.setattr(desk, "_carry_out", noted)
+    desk.order("me", "hold")
+    until(lambda: "vent" in done)
+    seen = desk.scope.number
+    until(lambda: desk.scope.since(seen) != [])
+    assert done == ["hold", "vent"]
+
+
+def test_a_real_bench_is_not_opened_with_the_calibrations_that_ship(desk: Desk) -> None:
+    desk.seat.take("me")
+    with pytest.raises(ExperimentError, match="define the virtual bench"):
+        desk.connect("me", Choice("bellow-bending", "mega"))
+    assert not desk.is_open
 
 
 def test_giving_control_back_vents(desk: Desk) -> None:

@@ -62,6 +62,7 @@ def test_files_of_runs_are_served_in_a_sandbox(lab: Path) -> None:
     log = client.get("/runs/run-1/run.mcap")
     assert log.content == b"log"
     assert "attachment" in log.headers["content-disposition"]
+    assert log.headers["content-security-policy"].startswith("sandbox ")
     for address in (
         "/runs/run-1/link.html",
         "/runs/elsewhere/secret.html",
@@ -71,6 +72,8 @@ def test_files_of_runs_are_served_in_a_sandbox(lab: Path) -> None:
         "/runs/run-1/nothing.csv",
         "/views/unknown",
         "/assets/..%2Fstate.py",
+        "/assets/__init__.py",
+        "/assets/palette.css",
     ):
         answer = client.get(address)
         assert answer.status_code == 404, address
