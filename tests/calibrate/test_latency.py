@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from datetime import date
+
 import numpy as np
 import pytest
 
 from rig.calibrate.errors import CalibrateError
 from rig.calibrate.latency import Array, Follower, Swing, fit_latency
+from rig.spec.calibration import Provenance
 
+PROVENANCE = Provenance(date=date(2025, 1, 1), method="swing", instrument="formulas")
 KNOWN = Follower(0.02, 0.012)
 CORNERS_S = np.array([0, 4, 8, 9, 10, 14, 18, 19, 20.0])
 CORNERS_KPA = np.array([2, 8, 2, 8, 2, 8, 2, 8, 2.0])
@@ -57,3 +61,16 @@ def test_an_actuator_that_does_not_hang_there_tells_no_latency() -> None:
     )
     with pytest.raises(CalibrateError):
         fit_latency(other, KNOWN)
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 0.08])
+def test_a_latency_is_never_below_nothing(delay_s: float) -> None:
+    kept = fit_latency(swing(delay_s), KNOWN).latency(PROVENANCE)
+    assert kept.value == pytest.approx(max(0.0, delay_s - 0.02), abs=1e-5)
+    assert kept.u == pytest.approx(0.012, abs=1e-4)
+
+
+def test_frames_before_what_they_show_are_refused() -> None:
+    slow = fit_latency(swing(0.0), Follower(0.03, 0.012))
+    with pytest.raises(CalibrateError, match="came 30 ms before"):
+        slow.latency(PROVENANCE)

@@ -206,6 +206,12 @@ def test_the_budget_of_a_displacement_is_what_makes_it_wrong(picture, tracker):
     longer = RULER.model_copy(update={"pitch": RULER.pitch + RULER.pitch_u})
     change = displacement_of(longer) - displacement_of(RULER)
     assert lines["ruler pitch"].contribution == pytest.approx(change, rel=0.05)
+    leaning = lines["ruler squareness"]
+    assert leaning.u == pytest.approx(np.radians(RULER.squareness_u_deg))
+    assert leaning.sensitivity == found.parts.shear
+    lens = lines["lens"]
+    assert lens.u == pytest.approx(np.radians(CAMERA.angle_u_deg))
+    assert lens.sensitivity == found.parts.lens == found.displacement_mm
     # a thing 1 mm before the plane, at 350 mm from the camera, looks larger by 1/350
     apart = {
         line.name: line for line in Picturing(CAMERA, RULER, 1.0).components(found.parts, "mm")
