@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -31,6 +32,13 @@ def test_every_module_of_a_verb_has_its_command_on_the_page(commands: str) -> No
     for name in modules:
         if name.startswith("calibrate_"):
             assert f"### `rig calibrate {name.removeprefix('calibrate_')}`" in commands
+
+
+def test_every_extra_is_on_the_page_of_the_installation() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    section = (ROOT / "docs/install.md").read_text("utf-8").split("## Extras")[1].split("\n## ")[0]
+    extras = re.findall(r"^\| `(\w+)` \|", section, re.MULTILINE)
+    assert sorted(extras) == sorted(project["optional-dependencies"])
 
 
 def test_options_stand_with_their_help_and_default(commands: str) -> None:
