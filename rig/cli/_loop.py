@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from datetime import date, datetime
+from datetime import date
 from pathlib import Path
 
 from rich.console import Console
@@ -16,7 +16,7 @@ from rig.cli._interruption import catching_signals
 from rig.experiment.bench import Bench
 from rig.experiment.identification import LoopRequest
 from rig.experiment.recorded import RunOutcome
-from rig.experiment.request import require_measured_calibrations
+from rig.experiment.request import created_now, require_measured_calibrations
 from rig.experiment.setup import require_valid_calibrations
 from rig.mechanics.outline import bending_shape
 from rig.record.writer import require_free_folder
@@ -30,12 +30,11 @@ Take = Callable[[Bench, Stage, Callable[[], None]], RunOutcome]
 def loop_request(setup: Setup, seed: int) -> LoopRequest:
     """The request of an experiment on the loop; raises ExperimentError for old calibrations."""
     require_valid_calibrations(setup.calibrations, date.today())
-    simulated = setup.bench.simulated
     return LoopRequest(
         setup=setup,
         seed=seed,
         cavity_volume=bending_shape(setup.actuator.geometry).cavity_volume,
-        created=None if simulated else datetime.now().astimezone().isoformat(timespec="seconds"),
+        created=created_now(setup),
     )
 
 

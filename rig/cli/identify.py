@@ -62,6 +62,7 @@ def identify(
     )
     from rig.record.reader import RunReader
     from rig.report.identification import write_identification
+    from rig.spec.free_path import first_free
     from rig.spec.workspace import Workspace
 
     console = Console(stderr=as_json)
@@ -76,7 +77,7 @@ def identify(
             soft_wrap=True,
         )
         setup = request.setup
-        run = out or _free(
+        run = out or first_free(
             workspace.logs / f"identify-{setup.actuator.name}-{setup.bench.name}-seed{seed}"
         )
         folder = run
@@ -98,11 +99,6 @@ def identify(
         return
     _show(console, analysis.family)
     console.print(f"identification: {page}", soft_wrap=True, markup=False)
-
-
-def _free(folder: Path) -> Path:
-    others = (folder.with_name(f"{folder.name}-{n}") for n in range(2, 100_000))
-    return next(p for p in (folder, *others) if not p.exists())
 
 
 def _show(console: Console, family: Family) -> None:

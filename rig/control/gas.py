@@ -25,10 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.control.errors import ControlError
+from rig.control.physics import ADIABATIC_EXPONENT
 
 Array = NDArray[np.float64]
-GAMMA = 1.4
-"""Ratio of the specific heats of air."""
 N, V, C, M, W, THETA, G = range(7)
 STATES = 7
 ANY_LEAK = 1e-8
@@ -253,7 +252,7 @@ class GasFilter:
         stroke = plunger - self._x
         space = line.line_volume - plunger + x[V] + x[W] + x[C] * p
         # heat given evenly over the step, of which some is lost before its end
-        heat = (GAMMA - 1) * (1 - warm) * line.heat_time / dt / space
+        heat = (ADIABATIC_EXPONENT - 1) * (1 - warm) * line.heat_time / dt / space
         transition = np.eye(STATES)
         transition[W, W], transition[W, M] = kept, (1 - kept) * p
         transition[THETA, THETA] = warm

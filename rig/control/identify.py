@@ -13,7 +13,7 @@ of terms is the one with the least Bayesian information criterion (Schwarz 1978)
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -93,15 +93,7 @@ class LevelModel:
 
     def scaled(self, gain: float) -> LevelModel:
         """The same dynamics with another gain, as of a gas volume smaller by that factor."""
-        return LevelModel(
-            self.level_kpa,
-            self.plunger_ml,
-            self.direct * gain,
-            tuple(c * gain for c in self.gains),
-            self.times_s,
-            self.delay_s,
-            self.backlash_ml,
-        )
+        return replace(self, direct=self.direct * gain, gains=tuple(c * gain for c in self.gains))
 
     def state_space(self) -> Any:
         """The rational part, without delay and backlash, as a `control.StateSpace`."""
@@ -176,7 +168,7 @@ def identify_level(
     if not found:
         raise ControlError("no linear model could be fitted to this recording.")
     best = min(found, key=lambda fit: fit.criterion)
-    return Fit(**{**vars(best), "alternatives": alternatives})
+    return replace(best, alternatives=alternatives)
 
 
 @dataclass(frozen=True)

@@ -30,10 +30,9 @@ from rig.control.relay import FrequencyPoint, relay_point
 from rig.experiment.bench import Bench
 from rig.experiment.errors import ExperimentError, LimitError
 from rig.experiment.prepare import (
-    board_parameters,
     leave_home,
     make_ready,
-    require_board_takes,
+    parameters_for,
     take_over,
     vent,
     write_parameters,
@@ -72,7 +71,7 @@ class IdentificationPlan:
 
     levels_kpa: tuple[float, ...]
     amplitude_kpa: float = 0.5
-    """Roughly how far the pressure-random excitation moves the pressure."""
+    """Roughly how far the pseudo-random excitation moves the pressure."""
     bits: int = 7
     rest_s: float = 10.0
     """At each level before it is shaken: creep must have slowed down."""
@@ -92,16 +91,7 @@ class LoopRequest:
 
     def board_parameters(self) -> dict[str, float]:
         """What the board is told before it moves; raises LimitError for what it would refuse."""
-        setup = self.setup
-        parameters = board_parameters(
-            setup.bench,
-            setup.actuator,
-            setup.calibrations.transducer,
-            self.cavity_volume,
-            setup.calibrations.syringe,
-        )
-        require_board_takes(parameters)
-        return parameters
+        return parameters_for(self.setup, self.cavity_volume)
 
 
 @dataclass(frozen=True)

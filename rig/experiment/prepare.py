@@ -16,6 +16,7 @@ from rig.spec.actuator import ActuatorSpec
 from rig.spec.bench import BenchSpec
 from rig.spec.calibration import SyringeCalibration, TransducerCalibration
 from rig.spec.protocol import SweepProtocol
+from rig.spec.workspace import Setup
 
 HOMING_TIMEOUT_S = 60.0
 VENT_TIMEOUT_S = 60.0
@@ -119,6 +120,16 @@ def require_board_takes(parameters: Mapping[str, float]) -> None:
         raise LimitError(
             "the bench asks for what the board refuses; nothing was moved.\n" + "\n".join(problems)
         )
+
+
+def parameters_for(setup: Setup, cavity_volume: float) -> dict[str, float]:
+    """`board_parameters` of a set-up; raises LimitError for what the board would refuse."""
+    calibrations = setup.calibrations
+    parameters = board_parameters(
+        setup.bench, setup.actuator, calibrations.transducer, cavity_volume, calibrations.syringe
+    )
+    require_board_takes(parameters)
+    return parameters
 
 
 def write_parameters(link: RigLink, wanted: dict[str, float]) -> dict[str, float]:

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.control.physics import motor_limit_s
 from rig.experiment.errors import LimitError
 from rig.experiment.plan import PREPARE_GUESS_S, VENT_GUESS_S, check_pressure
 from rig.mechanics.errors import MechanicsError
@@ -90,10 +91,8 @@ class Motor:
         return cls(flow, bench.controller.max_flow_acceleration, bench.syringe.volume)
 
     def least_time(self, stroke: float) -> float:
-        """Seconds for a stroke in m3 from rest to rest: a trapezoid of velocity."""
-        if stroke >= self.flow**2 / self.acceleration:
-            return stroke / self.flow + self.flow / self.acceleration
-        return 2 * math.sqrt(stroke / self.acceleration)
+        """Seconds for a stroke in m3 from rest to rest."""
+        return motor_limit_s(stroke * 1e6, self.flow * 1e6, self.acceleration * 1e6)
 
 
 def plan_trials(setup: Setup, cavity_volume: float) -> tuple[TrialPlan, ...]:

@@ -28,13 +28,18 @@ def make_request(setup: Setup, seed: int, *, expired: bool = False) -> RunReques
         seed=seed,
         cavity_volume=cavity,
         trials=plan_trials(setup, cavity),
-        created=None
-        if setup.bench.simulated
-        else datetime.now().astimezone().isoformat(timespec="seconds"),
+        created=created_now(setup),
         cautions=() if caution is None else (caution,),
     )
     request.board_parameters()  # a board would refuse them only once the bench is open
     return request
+
+
+def created_now(setup: Setup) -> str | None:
+    """ISO date and time for the log; None in simulated time."""
+    if setup.bench.simulated:
+        return None
+    return datetime.now().astimezone().isoformat(timespec="seconds")
 
 
 def require_measured_calibrations(setup: Setup) -> None:

@@ -8,7 +8,7 @@ from datetime import date
 
 from rig.experiment.errors import ExperimentError
 from rig.experiment.plan import Plan
-from rig.experiment.prepare import board_parameters, require_board_takes
+from rig.experiment.prepare import parameters_for
 from rig.experiment.program import TrialPlan
 from rig.spec.workspace import BenchCalibrations, Setup
 
@@ -53,13 +53,4 @@ class RunRequest:
 
     def board_parameters(self) -> dict[str, float]:
         """What the board is told before it moves; raises LimitError for what it would refuse."""
-        setup = self.setup
-        parameters = board_parameters(
-            setup.bench,
-            setup.actuator,
-            setup.calibrations.transducer,
-            self.cavity_volume,
-            setup.calibrations.syringe,
-        )
-        require_board_takes(parameters)
-        return parameters
+        return parameters_for(self.setup, self.cavity_volume)

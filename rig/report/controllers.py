@@ -67,7 +67,7 @@ def _section(name: str, outcomes: Sequence[Outcome], limits: Mapping[str, float]
         (Table(COLUMNS, [cells(one) for one in these]),),
         (
             (
-                _courses("case-" + "".join(filter(str.isalnum, name)), these),
+                _courses(_identifier(name), these),
                 "Set-point (grey) and pressures.",
             ),
         ),

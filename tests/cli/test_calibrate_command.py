@@ -105,10 +105,6 @@ def test_an_interrupted_calibration_keeps_its_points(
     assert f"rig calibrate pressure --bench virtual-beam --points {kept}" in outcome.out
 
 
-def unwrapped(text: str) -> str:
-    return " ".join(text.split())
-
-
 def test_a_bench_that_could_not_be_vented_is_not_said_to_be(
     rig: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -135,7 +131,7 @@ def test_points_that_cannot_be_kept_are_no_defect_and_nothing_moves_for_them(
     (tmp_path / "calibration" / "points").write_text("in the way")
     outcome = rig("calibrate", "loadcell", "--bench", "virtual-beam")
     assert outcome.code == 1
-    assert "points cannot be kept there: File exists. Nothing was moved." in unwrapped(outcome.err)
+    assert "points cannot be kept there: File exists. Nothing was moved." in outcome.err
     assert "taring" not in outcome.out
 
 
@@ -147,7 +143,7 @@ def test_a_full_disk_ends_a_calibration_with_the_bench_vented(
     monkeypatch.setattr("rig.cli._calibration.first_free", lambda *_: Path("/dev/full"))
     outcome = rig("calibrate", "loadcell", "--bench", "virtual-beam")
     assert outcome.code == 1
-    assert "/dev/full: a point cannot be written: No space left" in unwrapped(outcome.err)
+    assert "/dev/full: a point cannot be written: No space left" in outcome.err
     assert "The bench was vented" in outcome.out
     assert "points are kept" not in outcome.out
 
