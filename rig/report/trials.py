@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.experiment.program import Program, TrialPlan, plan_trials
-from rig.mechanics.bellow import bending_geometry
-from rig.mechanics.profile import cavity_volume
+from rig.mechanics.outline import bending_shape
 from rig.record.documents import LookDocument, PartDocument
 from rig.record.reader import RunReader
 from rig.report.charts import COLOURS, TALL, Chart, finished, stacked, styled
@@ -87,8 +86,7 @@ def trial_data(data: RunData) -> list[tuple[TrialPlan, list[PartData]]]:
     setup = data.setup
     if not setup.protocol.trials:
         return []
-    geometry = bending_geometry(setup.actuator, "A characterisation")
-    plans = plan_trials(setup, float(cavity_volume(geometry, 0.0)))
+    plans = plan_trials(setup, bending_shape(setup.actuator.geometry).cavity_volume)
     programs = {program.key: program for plan in plans for program in plan.programs}
     done = [
         _part_data(data.reader, setup, part, programs[part.key]) for part in data.reader.parts()

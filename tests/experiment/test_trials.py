@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,8 +18,12 @@ from rig.link.bus import SlcanBus
 from rig.link.slcan import RawFrame
 from rig.record.documents import PartDocument
 from rig.report.build import build_report
+from rig.report.data import RunData
+from rig.report.trials import trial_data
+from rig.spec.protocol import ProtocolSpec
+from rig.spec.workspace import Workspace
 
-from .conftest import VirtualRun, make_request, take, take_rest
+from .conftest import ROOT, VirtualRun, make_request, take, take_rest
 
 
 def protocol(*trials: dict[str, Any]) -> dict[str, object]:
@@ -156,6 +162,16 @@ def test_the_report_has_the_figures_of_each_trial(run: VirtualRun) -> None:
         assert title in page
     rows = (run.folder / "looks.csv").read_text(encoding="utf-8").splitlines()
     assert len(rows) == 1 + len(run.reader.looks())
+
+
+def test_the_report_plans_the_trials_of_any_actuator_that_bends() -> None:
+    setup = Workspace(ROOT).setup("bellow-rectangular", "virtual-beam")
+    trial = {"kind": "volumes", "name": "v", "stop": "2 mL", "steps": 2}
+    spec = ProtocolSpec.model_validate(protocol(trial))
+    reader = SimpleNamespace(parts=lambda: ())
+    data = RunData(reader, replace(setup, protocol=spec), (), None)  # type: ignore[arg-type]
+    ((plan, parts),) = trial_data(data)
+    assert (plan.trial.name, parts) == ("v", [])
 
 
 def test_a_killed_fatigue_run_goes_on_after_its_last_block(tmp_path: Path) -> None:
