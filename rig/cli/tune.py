@@ -67,6 +67,7 @@ def tune(
         tuning_document,
     )
     from rig.link.schema import load_schema
+    from rig.report.errors import ReportError
     from rig.report.tuning import write_tuning
 
     console = Console(stderr=as_json)
@@ -92,13 +93,18 @@ def tune(
     document["margins_kept_by_95_percent"] = {"gain_db": kept[0], "phase_deg": kept[1]}
 
     folder = out or (identification if identification.is_dir() else identification.parent)
-    folder.mkdir(parents=True, exist_ok=True)
     text = json.dumps(document, indent=2)
-    (folder / TUNING_FILE).write_text(text + "\n", encoding="utf-8")
     gains = board_gains(tuning.single)
-    (folder / GAINS_FILE).write_text(
-        provenance(family, tuning) + format_parameters(gains, rules.values()), encoding="utf-8"
-    )
+    commented = provenance(family, tuning) + format_parameters(gains, rules.values())
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / TUNING_FILE).write_text(text + "\n", encoding="utf-8")
+        (folder / GAINS_FILE).write_text(commented, encoding="utf-8")
+    except OSError as error:
+        raise ReportError(
+            f"{folder}: the gains cannot be written there: {error.strerror}. Choose another folder "
+            "with --out."
+        ) from error
     page = write_tuning(folder, family, tuning, kept)
     if write:
         _write(gains, family.bench, port, console)

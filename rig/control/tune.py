@@ -141,9 +141,18 @@ def tune(family: Family, wanted: Wanted) -> Tuning:
         raise ControlError(
             f"volumes of ±{100 * wanted.volume_share:g} % were asked for; expected 0 to below 100."
         )
+    _require_positive("gain margin", wanted.gain_db, "dB")
+    _require_positive("phase margin", wanted.phase_deg, "deg")
+    if wanted.bandwidth_hz is not None:
+        _require_positive("bandwidth", wanted.bandwidth_hz, "Hz")
     single = design(family, family.levels, wanted)
     schedule = {level.setpoint_kpa: design(family, (level,), wanted) for level in family.levels}
     return Tuning(wanted, single, schedule)
+
+
+def _require_positive(what: str, value: float, unit: str) -> None:
+    if not 0 < value < math.inf:
+        raise ControlError(f"a {what} of {value:g} {unit} was asked for; expected more than 0.")
 
 
 def design(family: Family, levels: Sequence[IdentifiedLevel], wanted: Wanted) -> Design:

@@ -37,3 +37,11 @@ def test_what_cannot_be_is_told_in_a_sentence(rig: Command, tmp_path: Path) -> N
     fast = rig("tune", tmp_path, "--bandwidth", "40")
     assert fast.code == 1
     assert "is possible" in fast.err
+    for option in ("--bandwidth", "--gain-margin", "--phase-margin"):
+        for value in ("0", "-1", "nan", "inf"):
+            senseless = rig("tune", tmp_path, option, value)
+            assert senseless.code == 1
+            assert "was asked for; expected more than 0" in senseless.err
+    occupied = rig("tune", tmp_path, "--out", tmp_path / "identification.json")
+    assert occupied.code == 1
+    assert "the gains cannot be written there: File exists" in occupied.err
