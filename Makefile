@@ -36,6 +36,7 @@ docs: $(READY)  ## the documentation, into build/site
 
 slow: $(READY)  ## the checks that take minutes
 	$(BIN)/python -m pytest -m slow
+	HYPOTHESIS_PROFILE=explore $(BIN)/python -m pytest -n 2 -m 'hypothesis and not slow'
 	$(MAKE) -C firmware lint coverage
 
 clean:

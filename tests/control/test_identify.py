@@ -165,7 +165,7 @@ def test_a_recording_that_says_nothing_is_refused(damage: str) -> None:
 # --- excitations ---------------------------------------------------------------------------------
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     volume=st.floats(0.05, 2.0),
     flow=st.floats(0.5, 20.0),

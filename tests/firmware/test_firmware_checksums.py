@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from board_under_test import crc8
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from rig.board._firmware import ffi, lib
 
@@ -20,13 +20,11 @@ def test_the_crc16_has_the_check_value_of_ccitt_false() -> None:
 
 
 @given(st.binary(max_size=40))
-@settings(deadline=None)
 def test_the_crc8_by_table_is_the_crc8_by_bits(data: bytes) -> None:
     assert lib.rig_test_crc8(data, len(data)) == crc8(data)
 
 
 @given(st.integers(0, 0x7FF), st.integers(0, 14), st.binary(min_size=8, max_size=8))
-@settings(deadline=None)
 def test_a_protected_frame_carries_counter_and_crc_over_id_and_payload(
     frame_id: int, alive: int, payload: bytes
 ) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 from board_under_test import Board
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from rig.board._firmware import ffi, lib
 
@@ -40,7 +40,6 @@ def test_words_are_twos_complement_of_24_bits(word: int, counts: int) -> None:
 
 
 @given(st.integers(-(1 << 23), (1 << 23) - 1))
-@settings(deadline=None)
 def test_every_count_survives_as_a_word(counts: int) -> None:
     assert lib.rig_test_hx711_counts(counts & 0xFFFFFF) == counts
 

@@ -58,7 +58,7 @@ def test_alive_counters_go_up_by_one_for_each_message() -> None:
 
 
 @given(st.integers(0, 63))
-@settings(max_examples=64, deadline=None)
+@settings(max_examples=64)
 def test_a_frame_with_a_flipped_bit_is_dropped_and_counted(bit: int) -> None:
     board = Board()
     board.run(200)

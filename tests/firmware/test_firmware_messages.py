@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from board_under_test import SCHEMA, protected
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from rig.board._firmware import ffi, lib
 
@@ -35,7 +35,6 @@ def packed(pack: Callable[..., None], *values: Any) -> bytes:
 
 
 @given(alive, st.integers(0, 6), byte, byte, st.integers(0, 7), st.integers(0, 4), byte)
-@settings(deadline=None)
 def test_heartbeats_agree(
     counter: int, state: int, fault: int, number: int, result: int, cause: int, flags: int
 ) -> None:
@@ -60,7 +59,6 @@ def test_heartbeats_agree(
 
 
 @given(alive, st.booleans(), st.booleans(), *[st.integers(0, 65535)] * 3)
-@settings(deadline=None)
 def test_pressure_reports_agree(
     counter: int, plausible: bool, saturated: bool, raw_p: int, raw_sp: int, raw_v: int
 ) -> None:
@@ -83,7 +81,6 @@ def test_pressure_reports_agree(
 
 
 @given(alive, st.integers(-32767, 32767), st.integers(-32767, 32767), st.integers(0, 65535))
-@settings(deadline=None)
 def test_controller_reports_agree(counter: int, raw_v: int, raw_i: int, raw_u: int) -> None:
     velocity, integral, voltage = raw_v / 1000, raw_i / 1000, raw_u / 10000
     ours = packed(lib.rig_test_pack_controller, counter, velocity, integral, voltage)
@@ -100,7 +97,6 @@ def test_controller_reports_agree(counter: int, raw_v: int, raw_i: int, raw_u: i
 
 
 @given(alive, st.integers(0, 3), st.integers(-(1 << 24), (1 << 24) - 1), st.integers(0, 65535))
-@settings(deadline=None)
 def test_load_cell_reports_agree(counter: int, status: int, counts: int, sample: int) -> None:
     ours = packed(lib.rig_test_pack_load_cell, counter, status, counts, sample)
     theirs = protected(
@@ -112,7 +108,6 @@ def test_load_cell_reports_agree(counter: int, status: int, counts: int, sample:
 
 
 @given(alive, st.integers(0, 15), single, st.integers(0, 255))
-@settings(deadline=None)
 def test_fault_reports_agree(counter: int, code: int, value: float, raw_age: int) -> None:
     ours = packed(lib.rig_test_pack_fault, counter, code, value, raw_age / 10)
     theirs = protected(
@@ -122,7 +117,6 @@ def test_fault_reports_agree(counter: int, code: int, value: float, raw_age: int
 
 
 @given(alive, st.integers(0, 4), byte, byte, single)
-@settings(deadline=None)
 def test_parameter_reports_agree(
     counter: int, result: int, number: int, index: int, value: float
 ) -> None:
@@ -141,7 +135,6 @@ def test_parameter_reports_agree(
 
 
 @given(alive, st.integers(0, 1), st.integers(0, 0xFFFFFF))
-@settings(deadline=None)
 def test_identities_agree(counter: int, kind: int, git: int) -> None:
     ours = packed(lib.rig_test_pack_identity, counter, kind, git)
     values = SCHEMA.decode_message("IDENTITY", ours, decode_choices=False)
@@ -150,7 +143,6 @@ def test_identities_agree(counter: int, kind: int, git: int) -> None:
 
 
 @given(st.integers(0, 15), st.integers(1, 255), st.floats(width=32))
-@settings(deadline=None)
 def test_commands_are_understood_whatever_the_argument(
     opcode: int, number: int, argument: float
 ) -> None:

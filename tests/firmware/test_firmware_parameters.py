@@ -149,7 +149,7 @@ def test_erased_memory_is_no_fault() -> None:
 
 
 @given(st.integers(0, 8 * lib.rig_host_nonvolatile_size() - 1))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_single_flipped_bit_in_memory_is_found_and_defaults_hold(bit: int) -> None:
     board = Board()
     board.write(deadband_kpa=0.02)
@@ -193,7 +193,7 @@ def test_an_image_with_a_value_out_of_range_is_not_used() -> None:
 
 
 @given(INDEX, st.floats(width=32))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_no_write_ever_leaves_a_value_outside_its_range(index: int, value: float) -> None:
     board = Board()
     board.run(110)

@@ -65,7 +65,7 @@ demands = st.lists(
 
 
 @given(demands, st.floats(0.5, 8), st.floats(5, 200), st.floats(2, 60))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_no_demand_exceeds_speed_acceleration_or_travel(
     sequence: list[tuple[bool, float, float, int]],
     max_flow: float,
@@ -90,7 +90,7 @@ def test_no_demand_exceeds_speed_acceleration_or_travel(
 
 
 @given(st.floats(0.001, 60), st.floats(0.1, 6), st.floats(5, 200))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_move_ends_at_its_target_without_overshoot(
     target: float, speed: float, acceleration: float
 ) -> None:
@@ -112,7 +112,7 @@ def test_a_long_move_is_a_trapezoid_and_takes_the_time_of_one() -> None:
 
 
 @given(demands)
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_steps_lie_inside_their_tick_and_apart_from_each_other(
     sequence: list[tuple[bool, float, float, int]],
 ) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from board_under_test import Board, line_of, protected
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from rig.board._firmware import ffi, lib
 
@@ -28,7 +28,6 @@ def parse(data: bytes) -> tuple[list[int], tuple[int, bytes]]:
 
 
 @given(st.integers(0, 0x7FF), st.binary(max_size=8))
-@settings(deadline=None)
 def test_a_formatted_frame_is_parsed_back(frame_id: int, payload: bytes) -> None:
     buffer = ffi.new("uint8_t[32]")
     length = lib.rig_test_slcan_format(frame_id, payload, len(payload), 0, 0, buffer)
@@ -84,7 +83,6 @@ def test_lines_are_what_the_lawicel_manual_says(line: bytes, kind: int) -> None:
 
 
 @given(st.lists(st.binary(max_size=60), max_size=20))
-@settings(deadline=None)
 def test_garbage_never_hides_the_next_good_line(pieces: list[bytes]) -> None:
     garbage = b"".join(pieces)
     kinds, frame = parse(garbage + b"\r" + line_of(0x201, b"\x01\x02"))
@@ -173,7 +171,6 @@ def test_time_stamps_follow_the_boards_clock_modulo_a_minute() -> None:
 
 
 @given(st.binary(max_size=300))
-@settings(deadline=None)
 def test_the_board_survives_any_bytes_and_still_answers(data: bytes) -> None:
     board = Board()
     board.type(data + b"\rO\r" + IDENTITY_REQUEST)

@@ -80,7 +80,7 @@ def test_closed_form_is_symbolic_castigliano(symbolic, changes):
     )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(geometry=bending_bellows())
 def test_closed_form_minimises_the_complementary_energy(geometry):
     """Gauss quadrature of M^2; the minimum over M_A of a quadratic by three evaluations."""

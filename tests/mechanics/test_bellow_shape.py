@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bellow_strategies import bending_bellows
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -139,7 +139,6 @@ def test_masses_follow_from_the_densities(default_geometry):
     assert shape.cap_mass(1180.0) == pytest.approx(1180 * shape.cap_volume)
 
 
-@settings(deadline=None)
 @given(geometry=bending_bellows())
 def test_volumes_are_positive_and_the_cavity_holds_at_least_its_narrowest_tube(geometry):
     shape = BellowShape.of(geometry)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bellow_strategies import bending_bellows
-from hypothesis import given, settings
+from hypothesis import given
 
 from rig.mechanics.bellow import BellowShape
 from rig.mechanics.blocked import blocked_force, pressure_moment
@@ -14,7 +14,6 @@ from rig.mechanics.section import disc_union
 from rig.spec.actuator import BellowBendingGeometry
 
 
-@settings(deadline=None)
 @given(geometry=bending_bellows())
 def test_moment_and_stop_together_leave_the_tip_where_it_is(geometry):
     """Mohr's integral of M_p - F (c - x) times the arm (c - x) over the flexible length is 0."""

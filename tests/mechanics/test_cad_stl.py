@@ -103,7 +103,7 @@ def test_a_missing_library_is_named_with_its_remedy(monkeypatch):
         triangulate(rod.solid)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(geometry=bending_bellows())
 def test_soft_parts_are_watertight_over_the_constraint_range(geometry):
     soft = parts_of(geometry)[0].solid
@@ -112,7 +112,7 @@ def test_soft_parts_are_watertight_over_the_constraint_range(geometry):
     assert volume(surface) == pytest.approx(BellowShape.of(geometry).soft_volume, rel=0.05)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(geometry=axisymmetric_bellows())
 def test_axisymmetric_soft_parts_are_watertight_over_the_constraint_range(geometry):
     shape = AxisymmetricBellow.of(geometry)

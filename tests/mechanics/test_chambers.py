@@ -120,7 +120,7 @@ def shoelace(outline):
 
 
 @given(angle=st.floats(-0.2, 2.6), which=st.sampled_from([BELLOWS, BLOCK, HYBRID]))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_the_cap_turns_by_the_angle_and_the_layer_keeps_its_length(angle, which):
     row = ChamberRow.of(which)
     shown = side_profile(which, angle)

@@ -53,7 +53,7 @@ def pose(angle: float) -> Pose:
 
 
 @given(st.floats(0.01, 5.0), st.floats(0.01, 5.0), st.floats(0.01, 3.0))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_between_arcs_of_two_angles_is_the_arc_of_the_angle_between(one, other, share):
     weights = np.array([1 - share / 3, share / 3])
     between = float(weights @ [one, other])

@@ -33,7 +33,7 @@ def _shell(nx: int, ny: int, dofs: int, shift: float, seed: int = 0) -> sparse.c
     return result
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(
     nx=st.integers(1, 40),
     ny=st.integers(1, 12),

@@ -81,7 +81,7 @@ def test_stress_and_tangent_are_the_slopes_of_small_differences(energy: Energy) 
 
 
 @each(ALL)
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(f=deformations())
 def test_the_tangent_is_symmetric(energy: Energy, f: Array) -> None:
     tangent = energy.tangent(f)
@@ -89,7 +89,7 @@ def test_the_tangent_is_symmetric(energy: Energy, f: Array) -> None:
 
 
 @each(OBJECTIVE)
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(f=deformations(), turn=rotations)
 def test_a_turned_observer_sees_turned_stress(energy: Energy, f: Array, turn: Array) -> None:
     scale = np.abs(energy.tangent(f)).max()
@@ -101,7 +101,7 @@ def test_a_turned_observer_sees_turned_stress(energy: Energy, f: Array, turn: Ar
 
 
 @each(OBJECTIVE)
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(f=deformations(), turn=rotations)
 def test_no_direction_of_the_material_is_special(energy: Energy, f: Array, turn: Array) -> None:
     scale = np.abs(energy.tangent(f)).max()
@@ -111,7 +111,7 @@ def test_no_direction_of_the_material_is_special(energy: Energy, f: Array, turn:
 
 
 @each(OBJECTIVE)
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(f=deformations())
 def test_moments_balance(energy: Energy, f: Array) -> None:
     kirchhoff = energy.first_piola(f) @ f.T
@@ -120,7 +120,7 @@ def test_moments_balance(energy: Energy, f: Array) -> None:
 
 
 @each(ISOCHORIC)
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(f=deformations())
 def test_swelling_costs_an_isochoric_energy_nothing(energy: Energy, f: Array) -> None:
     assert energy.energy(1.7 * f) == pytest.approx(energy.energy(f), rel=1e-11, abs=1e-9)

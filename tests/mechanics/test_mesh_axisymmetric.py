@@ -94,7 +94,7 @@ def test_every_case_of_table_2_has_valid_elements():
         assert scaled_jacobian(mesh_axisymmetric_bellow(shape).mesh) > least
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(geometry=axisymmetric_bellows(), through=st.integers(1, 4), along=st.integers(2, 5))
 def test_no_element_is_inverted(geometry: BellowAxisymmetricGeometry, through: int, along: int):
     shape = AxisymmetricBellow.of(geometry)

@@ -141,7 +141,7 @@ def test_default_actuator_has_good_elements():
     assert scaled_jacobian(level.mesh) > 0.35
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(geometry=bending_bellows(), wall=st.integers(1, 2), crown=st.integers(3, 8))
 def test_no_element_is_inverted_over_the_constraint_range(geometry, wall, crown):
     resolution = BendingResolution(wall=wall, crown=crown)

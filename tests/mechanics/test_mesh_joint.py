@@ -40,14 +40,14 @@ def joint_bellows(draw: st.DrawFn) -> BellowJointGeometry:
 
 
 @given(geometry=joint_bellows())
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 def test_every_admitted_bellow_has_a_sound_mesh_with_a_closed_cavity(
     geometry: BellowJointGeometry,
 ) -> None:
     shape = JointBellow.of(geometry)
-    mesh = mesh_joint_bellow(shape, JointResolution(wall=1, fifth=3, end=1, end_radius=2)).mesh
+    mesh = mesh_joint_bellow(shape).mesh
     assert scaled_jacobian(mesh) > 0.02
-    assert volume_of_revolution(mesh) == pytest.approx(shape.soft_volume, rel=1e-2)
+    assert volume_of_revolution(mesh) == pytest.approx(shape.soft_volume, rel=2e-3)
     d = discretise(mesh, Kinematics.AXISYMMETRIC)
     wall = PressureSurface(d, d.facets_on("cavity"))
     assert wall.rest_area[1] == pytest.approx(0.0, abs=1e-12)

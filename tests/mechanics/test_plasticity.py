@@ -41,7 +41,7 @@ def strained(seed: int, size: float, points: int = 6) -> np.ndarray:
 
 
 @given(seed=st.integers(0, 10**6), before=st.floats(0.0, 0.4), size=st.floats(0.02, 0.3))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_stress_and_tangent_are_the_derivatives_of_the_step_s_energy(
     seed: int, before: float, size: float
 ) -> None:
@@ -74,7 +74,7 @@ def logs_of(step, f: np.ndarray) -> np.ndarray:
 
 
 @given(seed=st.integers(0, 10**6))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_flow_keeps_the_volume_and_ends_on_the_yield_surface(seed: int) -> None:
     before = EVA.afterwards(EVA.virgin((6,)), strained(seed + 1, 0.3))
     f = strained(seed, 0.3)

@@ -51,7 +51,7 @@ def test_the_end_cap_is_rigid_and_turned_by_exactly_the_angle(geometry, angle):
     np.testing.assert_allclose(after, before @ turn.T, atol=1e-14)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(geometry=bending_bellows(), part=st.floats(0, 1))
 def test_outlines_are_simple_and_counter_clockwise_until_unfolded(geometry, part):
     angle = part * min(unfolding_angle(geometry), np.radians(170))
@@ -88,7 +88,6 @@ def test_the_straight_profile_is_the_drawing(default_geometry):
     assert gaps.max() < 1e-8
 
 
-@settings(deadline=None)
 @given(geometry=bending_bellows(), part=st.floats(-0.1, 0.999))
 def test_bending_keeps_the_arc_lengths(geometry, part):
     half = BellowShape.of(geometry).middle_surface
@@ -148,14 +147,13 @@ def test_tip_of_the_workspace_is_the_lower_far_corner_of_the_cap(default_geometr
     assert tips[3, 1] < tips[2, 1] < tips[1, 1] < tips[0, 1]
 
 
-@settings(deadline=None)
 @given(geometry=bending_bellows())
 def test_cavity_of_the_straight_bellow_is_the_undeformed_one(geometry):
     exact = BellowShape.of(geometry).cavity_volume
     assert float(cavity_volume(geometry, 0.0)) == pytest.approx(exact, rel=1e-5)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(geometry=bending_bellows())
 def test_cavity_grows_with_bending_until_unfolded(geometry):
     highest = min(unfolding_angle(geometry), np.radians(170))

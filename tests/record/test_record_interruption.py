@@ -85,7 +85,7 @@ def read_everything(folder: Path) -> int:
     return len(points)
 
 
-@settings(deadline=None, max_examples=150, suppress_health_check=MANY_FOLDERS)
+@settings(max_examples=150, suppress_health_check=MANY_FOLDERS)
 @given(share=st.floats(0, 1))
 def test_any_truncation_leaves_a_readable_prefix_or_a_clear_error(
     whole: WholeLog, damaged: Callable[[bytes], Path], share: float
@@ -111,7 +111,7 @@ def test_every_record_boundary_is_a_good_place_to_stop(
     assert set(counts) == {0, 1, 2, 3, 4}
 
 
-@settings(deadline=None, max_examples=150, suppress_health_check=MANY_FOLDERS)
+@settings(max_examples=150, suppress_health_check=MANY_FOLDERS)
 @given(data=st.data())
 def test_any_flipped_byte_is_noticed_or_harmless(
     whole: WholeLog, damaged: Callable[[bytes], Path], data: st.DataObject
@@ -137,7 +137,7 @@ def test_any_flipped_byte_is_noticed_or_harmless(
         reader.telemetry("PRESSURE")
 
 
-@settings(deadline=None, max_examples=60, suppress_health_check=MANY_FOLDERS)
+@settings(max_examples=60, suppress_health_check=MANY_FOLDERS)
 @given(share=st.floats(0, 1))
 def test_any_truncated_run_can_be_resumed_and_finished(
     whole: WholeLog, damaged: Callable[[bytes], Path], share: float

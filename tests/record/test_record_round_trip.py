@@ -253,7 +253,7 @@ def test_a_document_with_a_number_that_is_none_is_refused_before_it_is_written()
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
 st.register_type_strategy(float, NUMBERS)
-ON_DISK = settings(deadline=None, max_examples=30)
+ON_DISK = settings(max_examples=30)
 TEXTS = st.text(max_size=20)
 
 

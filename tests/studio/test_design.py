@@ -108,7 +108,7 @@ def test_a_material_is_a_name_of_the_workspace_and_no_path() -> None:
         assert "material" in check(replace(DEFAULT, material=material), LIBRARY).problems
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(st.text(max_size=30), st.sampled_from(["name", "value"]))
 def test_no_text_breaks_out_of_its_field(text: str, where: str) -> None:
     draft = (

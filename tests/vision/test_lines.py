@@ -22,7 +22,7 @@ def misses(fit, direction_deg: float) -> float:
     return (found - direction_deg + 90.0) % 180.0 - 90.0
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(direction=st.floats(-180.0, 180.0), x=st.floats(-1e3, 1e3), y=st.floats(-1e3, 1e3))
 def test_exact_points_give_their_line_wherever_it_lies(direction, x, y):
     fit = fit_line(along(direction) + np.array([x, y]), np.ones(100))

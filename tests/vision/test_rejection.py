@@ -184,7 +184,7 @@ small_images = st.tuples(st.integers(1, 40), st.integers(1, 40)).flatmap(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(image=small_images, bends=st.sampled_from(["left", "right"]))
 def test_no_small_image_whatsoever_crashes(image, bends):
     result = AngleMeter(ruler=RULER, ruler_required=False, bends=bends).measure(image)
@@ -192,7 +192,7 @@ def test_no_small_image_whatsoever_crashes(image, bends):
     assert result.accepted or result.reason
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     seed=st.integers(0, 2**32 - 1),
     count=st.integers(0, 40),

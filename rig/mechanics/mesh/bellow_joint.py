@@ -9,6 +9,7 @@ is a multiple of five: the paper's ten latitudes of a bellow, A at the trough to
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import ceil
 from typing import Literal
 
 import numpy as np
@@ -130,6 +131,13 @@ class JointResolution:
     end_radius: int = 6
     """Along the radius of a disc, without the wall."""
 
+    @classmethod
+    def resolving(cls, shape: JointBellow) -> JointResolution:
+        """The default numbers, with as many more along the meridian as two elements of every arc
+        ask for: where one element holds a whole arc, the wall's volume is up to 1 % too small."""
+        arc = shape.rounding * shape.flank_angle
+        return cls(fifth=max(cls.fifth, ceil(2 * shape.meridian / (_FIFTHS * arc))))
+
 
 @dataclass(frozen=True)
 class JointBellowMesh:
@@ -145,8 +153,11 @@ class JointBellowMesh:
 def mesh_joint_bellow(
     shape: JointBellow, resolution: JointResolution | None = None
 ) -> JointBellowMesh:
-    """Mesh the meridian of a joint bellow; the nodes of its faces lie on them."""
-    n = resolution or JointResolution()
+    """Mesh the meridian of a joint bellow; the nodes of its faces lie on them.
+
+    Without a resolution the arcs are resolved, however sharp they are.
+    """
+    n = resolution or JointResolution.resolving(shape)
     half = half_bellow(shape, n)
     bellow = [half, half.mirrored(shape.pitch / 2, axis=1)]
     inner, outer = (shape.trough_radius + side * shape.wall / 2 for side in (-1, 1))

@@ -72,7 +72,7 @@ def fold(
     finished, telling where it ended.
     """
     shape = JointBellow.of(geometry)
-    mesh, named = join([_half(shape, resolution or JointResolution())])
+    mesh, named = join([_half(shape, resolution or JointResolution.resolving(shape))])
     d = discretise(mesh.with_boundaries(named, boundaries_only=False), Kinematics.AXISYMMETRIC)
     trough, crest = d.nodes_on("trough"), d.nodes_on("crest")
     outer = Sampling.of_facets(d, d.facets_on("outside"))
