@@ -32,6 +32,14 @@ def distorted(mesh, amount: float = 0.15, seed: int = 1):
     return type(mesh)(moved, mesh.t)
 
 
+def driven(d: Discretisation, solids: list[Solid], slope: np.ndarray) -> Model:
+    """The whole surface moved as u = slope X."""
+    edge = np.unique(d.basis.get_dofs().flatten())
+    moved = d.nodes[edge] @ slope.T
+    supports = [Support(d.dim * edge + i, moved[:, i]) for i in range(d.dim)]
+    return Model(d, solids, supports=supports)
+
+
 def meshes() -> dict[str, tuple[object, Kinematics]]:
     """One distorted mesh for each element and kinematics."""
     hexes, tets = skfem.MeshHex().refined(1), skfem.MeshTet().refined(1)

@@ -31,19 +31,11 @@ from rig.mechanics.hyperelastic import (
     Yeoh,
     response,
 )
-from tests.mechanics.fe_problems import BULK, SHEAR, curved_triangles, meshes, ring
+from tests.mechanics.fe_problems import BULK, SHEAR, curved_triangles, driven, meshes, ring
 
 SHARP = Options(tolerance=1e-10, correction=0.0)
 MESHES = meshes()
 SOLIDS = ("hexahedra", "tetrahedra")
-
-
-def _driven(d, solids, slope: np.ndarray) -> Model:
-    """The whole surface moved as u = slope X."""
-    edge = np.unique(d.basis.get_dofs().flatten())
-    moved = d.nodes[edge] @ slope.T
-    supports = [Support(d.dim * edge + i, moved[:, i]) for i in range(d.dim)]
-    return Model(d, solids, supports=supports)
 
 
 def _solved(model: Model) -> Solution:
@@ -62,7 +54,7 @@ def test_a_pulled_bar_has_the_stress_and_stretch_of_the_material_test(
     across = float(bar.transverse_stretch[0])
     d = discretise(MESHES[name][0], mixed=mixed)
     solid = Solid(d, energy, volume)
-    solution = _solved(_driven(d, [solid], np.diag([0.6, across - 1, across - 1])))
+    solution = _solved(driven(d, [solid], np.diag([0.6, across - 1, across - 1])))
     true_stress = float((bar.nominal_stress * 1.6 / bar.volume_ratio)[0])
     at_points = point_fields(solid, solution.state.x, solution.state.points[0])
     for found in (at_points, recovered(solid, at_points)):
@@ -83,7 +75,7 @@ def test_simple_shear_has_rivlins_stresses_and_stretches(name: str) -> None:
     solid = Solid(d, NeoHookean(SHEAR), QuadraticVolume(BULK))
     slope = np.zeros((d.dim, d.dim))
     slope[0, 1] = amount
-    model = _driven(d, [solid], slope)
+    model = driven(d, [solid], slope)
     (found,) = nodal_fields(model, _solved(model).state)
     np.testing.assert_allclose(found.stress[0, 1], SHEAR * amount, rtol=1e-7)
     np.testing.assert_allclose(found.stress[0, 0] - found.stress[1, 1], SHEAR * amount**2)
@@ -187,7 +179,7 @@ def test_two_materials_keep_their_own_stress_at_the_nodes_between_them() -> None
     bar = response(Hyperelastic(soft.distortion, soft.volume), Mode.UNIAXIAL, np.array([1.5]))
     across = float(bar.transverse_stretch[0])
     true_stress = float((bar.nominal_stress * 1.5 / bar.volume_ratio)[0])
-    model = _driven(d, [soft, stiff], np.diag([0.5, across - 1, across - 1]))
+    model = driven(d, [soft, stiff], np.diag([0.5, across - 1, across - 1]))
     solution = _solved(model)
     below, above = nodal_fields(model, solution.state)
     np.testing.assert_allclose(below.stress[0, 0], true_stress, rtol=1e-6)

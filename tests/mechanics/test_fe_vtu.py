@@ -26,7 +26,7 @@ from rig.mechanics.fe import (
 from rig.mechanics.fe.vtu import grid_of, write_vtu
 from rig.mechanics.hyperelastic import NeoHookean, QuadraticVolume
 from rig.mechanics.mesh.curved import CurvedHex
-from tests.mechanics.fe_problems import BULK, SHEAR, bending_tube, meshes
+from tests.mechanics.fe_problems import BULK, SHEAR, bending_tube, driven, meshes
 
 MESHES = meshes()
 
@@ -79,9 +79,7 @@ def _sheared(mesh, amount: float = 0.5):
     solid = Solid(d, NeoHookean(SHEAR), QuadraticVolume(BULK))
     slope = np.zeros((3, 3))
     slope[0, 2] = amount
-    edge = np.unique(d.basis.get_dofs().flatten())
-    moved = d.nodes[edge] @ slope.T
-    model = Model(d, [solid], supports=[Support(3 * edge + i, moved[:, i]) for i in range(3)])
+    model = driven(d, [solid], slope)
     result = follow(model, [Point(0.0)], options=Options(tolerance=1e-9))
     assert result.failure is None
     return model, result.solutions
