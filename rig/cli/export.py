@@ -11,6 +11,9 @@ import typer
 from rig.cli.app import app
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rig.mechanics.cad.construct import Part
     from rig.mechanics.deck.write import DeckModel
     from rig.spec.actuator import ActuatorSpec
 
@@ -47,6 +50,10 @@ def export(
         Path | None,
         typer.Option(help="finite element model as an input deck: mesh, material, cap, loads"),
     ] = None,
+    mould: Annotated[
+        Path | None,
+        typer.Option(help="moulds of a cast actuator as STL, one file a piece: FILE-PIECE.stl"),
+    ] = None,
     tolerance: Annotated[
         str, typer.Option(help="furthest that STL chords leave round surfaces")
     ] = "0.01 mm",
@@ -67,19 +74,27 @@ def export(
 ) -> None:
     """Write the actuator's geometry: watertight STL for printing, STEP for CAD. All in mm.
 
-    The soft part has its air inlet. Needs the CAD libraries: `pip install 'rig[cad]'`.
+    The soft part has its air inlet. Actuators of silicone have moulds. Needs the CAD libraries:
+    `pip install 'rig[cad]'`.
 
     The input deck for CalculiX or Abaqus (mm, N, MPa) is the part that symmetry leaves,
     without the inlet, as `--model fe` computes it. CalculiX has no mixed tetrahedra: its own are
     several per cent too stiff at a Poisson's ratio of 0.49, its hexahedra are not.
 
-    Example: `rig export --actuator models/actuators/bellow-bending.yaml --stl bellow.stl`
+    Examples: `rig export --actuator models/actuators/bellow-bending.yaml --stl bellow.stl`;
+    `rig export --actuator models/actuators/multi-chamber-bending.yaml --mould block.stl`
     """
     from rig.spec.loading import load_actuator
 
-    if stl is None and step is None and inp is None:
-        raise typer.BadParameter("nothing to write: give --stl FILE, --step FILE or --inp FILE.")
+    if stl is None and step is None and inp is None and mould is None:
+        raise typer.BadParameter(
+            "nothing to write: give --stl FILE, --step FILE, --mould FILE or --inp FILE."
+        )
     spec = load_actuator(actuator)
+    if mould is not None:
+        from rig.mechanics.cad.moulds import moulds_of
+
+        _write_stl(mould, moulds_of(spec.geometry), tolerance)
     if stl is not None or step is not None:
         _write_geometry(spec, stl, step, tolerance)
     if inp is not None:
@@ -128,20 +143,25 @@ def _write_geometry(
 
     parts = parts_of(spec.geometry)
     if stl is not None:
-        from rig.mechanics.cad.facets import triangulate
-        from rig.mechanics.cad.stl import volume, write_stl
-
-        chord = _tolerance(tolerance)
-        surfaces = [triangulate(part.solid, chord) for part in parts]
-        for part, surface in zip(parts, surfaces, strict=True):
-            path = stl if part.is_soft else stl.with_stem(f"{stl.stem}-{part.name}")
-            count = write_stl(path, surface)
-            typer.echo(f"{path}: {part.name}, {count} triangles, {volume(surface) * 1e6:.3f} mL")
+        _write_stl(stl, parts, tolerance)
     if step is not None:
         from rig.mechanics.cad.brep import write_step
 
         write_step(step, parts)
         typer.echo(f"{step}: {', '.join(part.name for part in parts)}")
+
+
+def _write_stl(path: Path, parts: Sequence[Part], tolerance: str) -> None:
+    """The soft part into the file, every other one beside it."""
+    from rig.mechanics.cad.facets import triangulate
+    from rig.mechanics.cad.stl import volume, write_stl
+
+    chord = _tolerance(tolerance)
+    surfaces = [triangulate(part.solid, chord) for part in parts]
+    for part, surface in zip(parts, surfaces, strict=True):
+        file = path if part.is_soft else path.with_stem(f"{path.stem}-{part.name}")
+        count = write_stl(file, surface)
+        typer.echo(f"{file}: {part.name}, {count} triangles, {volume(surface) * 1e6:.3f} mL")
 
 
 def _quantity(option: str, text: str, si: str) -> float:

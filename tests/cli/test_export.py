@@ -24,6 +24,14 @@ def test_stl_of_every_part_is_written_and_watertight(rig: Command, tmp_path: Pat
         assert is_watertight(read_stl(tmp_path / name))
 
 
+def test_moulds_of_a_cast_actuator_are_written(rig: Command, tmp_path: Path) -> None:
+    pytest.importorskip("manifold3d")
+    actuator = "models/actuators/multi-chamber-bending.yaml"
+    assert rig("export", "--actuator", actuator, "--mould", tmp_path / "block.stl").code == 0
+    for name in ("block-upper-tray.stl", "block-lower-tray.stl", "block-layer-tray.stl"):
+        assert is_watertight(read_stl(tmp_path / name))
+
+
 def test_an_input_deck_is_written_and_described(rig: Command, tmp_path: Path) -> None:
     out = tmp_path / "bellow.inp"
     outcome = rig(
@@ -41,6 +49,7 @@ def test_an_input_deck_is_written_and_described(rig: Command, tmp_path: Path) ->
     ("arguments", "word"),
     [
         ((), "--stl"),
+        (("--mould", "x.stl"), "printed"),
         (("--inp", "x.inp", "--pressure", "3 mm"), "--pressure"),
         (("--inp", "x.inp", "--pressure", "-3 kPa"), "above zero"),
         (("--inp", "x.inp", "--size", "3 mm"), "--size"),

@@ -79,7 +79,7 @@ def bending_soft_body(shape: BellowShape, *, inlet: bool = True) -> Combined:
 
 def _chamber_parts(row: ChamberRow) -> tuple[Part, ...]:
     last = row.segments[-1].outline
-    cap = Combined((_box(last, row.end, row.tip),))
+    cap = Combined((box(last, row.end, row.tip),))
     parts = [Part("soft", chamber_soft_body(row), is_soft=True), Part("cap", cap, is_soft=False)]
     if row.layer:
         parts.append(Part("layer", Combined((_layer(row),)), is_soft=False))
@@ -88,26 +88,34 @@ def _chamber_parts(row: ChamberRow) -> tuple[Part, ...]:
 
 def chamber_soft_body(row: ChamberRow) -> Combined:
     """All segments in one, with an inlet through the first wall, but for the layer below."""
-    outside, cavity = [], []
-    for start, end, segment in zip(row.starts(), row.starts()[1:], row.segments, strict=False):
-        outside.append(_box(segment.outline, float(start), float(end)))
-        if segment.cavity is not None:
-            cavity.append(_box(segment.cavity, float(start), float(end)))
-    # through the solid first segment, as wide as the narrowest cavity behind it
-    narrowest = min(
-        (s.cavity for s in row.segments if s.cavity is not None), key=lambda cavity: cavity.area
-    )
-    cavity.append(_box(narrowest, row.start, float(row.starts()[1])))
-    removed = (*cavity, _layer(row)) if row.layer else tuple(cavity)
-    return Combined(tuple(outside), removed)
+    ends = pairwise(float(x) for x in row.starts())
+    outside = tuple(box(s.outline, *along) for s, along in zip(row.segments, ends, strict=True))
+    cavity = tuple(box(section, start, end) for section, start, end in cavities(row))
+    return Combined(outside, (*cavity, _layer(row)) if row.layer else cavity)
+
+
+def cavities(row: ChamberRow) -> tuple[tuple[Rectangle, float, float], ...]:
+    """Sections of chambers, passages and inlet, with x where they begin and end in m.
+
+    The inlet goes through the solid first segment, as wide as the narrowest cavity behind it.
+    """
+    ends = pairwise(float(x) for x in row.starts())
+    inside = [
+        (segment.cavity, *along)
+        for segment, along in zip(row.segments, ends, strict=True)
+        if segment.cavity is not None
+    ]
+    narrowest = min((section for section, *_ in inside), key=lambda section: section.area)
+    return (*inside, (narrowest, row.start, float(row.starts()[1])))
 
 
 def _layer(row: ChamberRow) -> Prism:
     below = Rectangle(row.half_width, row.underside, row.underside + row.layer)
-    return _box(below, row.start, row.end)
+    return box(below, row.start, row.end)
 
 
-def _box(section: Rectangle, start: float, end: float) -> Prism:
+def box(section: Rectangle, start: float, end: float) -> Prism:
+    """A section swept along x, from start to end in m."""
     y, low, high = section.half_width, section.low, section.high
     return Prism(((-y, low), (y, low), (y, high), (-y, high)), start, end)
 
@@ -116,8 +124,8 @@ def axisymmetric_soft_body(shape: AxisymmetricBellow) -> Combined:
     """Collar, bellows and top, standing on z = 0 and open below."""
     inner, under = shape.radius - shape.wall, shape.height - shape.wall
     return Combined(
-        added=(Revolved(_scalloped(shape, shape.radius, shape.height), axis="z"),),
-        removed=(Revolved(_scalloped(shape, inner, under), axis="z"),),
+        added=(Revolved(scalloped(shape, shape.radius, shape.height), axis="z"),),
+        removed=(Revolved(scalloped(shape, inner, under), axis="z"),),
     )
 
 
@@ -227,7 +235,7 @@ def _bellow_profile(shape: BellowShape, offset: float) -> tuple[Line | Arc, ...]
     return tuple(pieces)
 
 
-def _scalloped(shape: AxisymmetricBellow, radius: float, top: float) -> tuple[Line | Arc, ...]:
+def scalloped(shape: AxisymmetricBellow, radius: float, top: float) -> tuple[Line | Arc, ...]:
     """Profile from z = 0: collar, arcs over chords at `radius`, and on to `top`."""
     cusps = [shape.collar + number * shape.pitch for number in range(shape.layers + 1)]
     arcs = [
