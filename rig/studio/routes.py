@@ -7,6 +7,7 @@ from importlib import resources
 from fastapi import APIRouter
 from starlette.responses import FileResponse, HTMLResponse, PlainTextResponse, Response
 
+from rig.errors import RigError
 from rig.studio.errors import StudioError
 from rig.studio.files import inside
 from rig.studio.state import Studio
@@ -19,6 +20,7 @@ SANDBOXED = {
     )
 }
 SHOWN = {".html": "text/html; charset=utf-8", ".json": "application/json", ".csv": "text/csv"}
+KEPT_FOR_A_WHILE = {"cache-control": "private, max-age=300"}
 ASSETS = {"studio.css": "text/css", "studio.js": "text/javascript"}
 
 
@@ -38,6 +40,15 @@ def routes(studio: Studio) -> APIRouter:
         if download or kind is None:
             return FileResponse(path, filename=f"{run}-{name}", headers=SANDBOXED)
         return FileResponse(path, media_type=kind, headers=SANDBOXED)
+
+    @router.get("/pictures/{run}/{frame}")
+    def picture(run: str, frame: int, overlay: bool = False) -> Response:
+        try:
+            replay = studio.replays.of(inside(studio.workspace.logs, run))
+            jpeg = replay.picture(frame, overlay)
+        except RigError as error:
+            return PlainTextResponse(str(error), 404)
+        return Response(jpeg, media_type="image/jpeg", headers=KEPT_FOR_A_WHILE)
 
     @router.get("/views/{key}")
     def view(key: str) -> Response:

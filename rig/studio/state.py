@@ -14,6 +14,7 @@ from rig.spec.workspace import Workspace
 from rig.studio.calculation import Calculation
 from rig.studio.desk import Desk
 from rig.studio.errors import StudioError
+from rig.studio.replay import Replays
 from rig.studio.seat import Seat
 from rig.studio.works import report
 
@@ -71,6 +72,7 @@ class Studio:
     workspace: Workspace
     workshop: Workshop = field(default_factory=Workshop)
     views: Views = field(default_factory=Views)
+    replays: Replays = field(default_factory=Replays)
     desk: Desk = field(init=False)
 
     def __post_init__(self) -> None:

@@ -20,10 +20,9 @@ from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
 
 from rig.spec.loading import load_actuator
-from rig.spec.workspace import library_root
+from tests.studio.lab import make_lab
 
 ROOT = Path(__file__).resolve().parents[2]
-SPECS = ROOT / "tests/specs"
 START = "from rig.cli.main import main; main()"
 PATIENT_S = 90.0
 """Against a test that hangs; nothing is asserted of it."""
@@ -39,9 +38,7 @@ def _browser() -> str:
 @pytest.fixture(scope="module")
 def lab(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("lab")
-    for folder in ("models", "calibration"):
-        shutil.copytree(library_root() / folder, root / folder)
-    shutil.copy(SPECS / "bellow-bending.yaml", root / "models/actuators")
+    make_lab(root)
     return root
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -18,15 +17,14 @@ from rig.experiment.bench import Bench
 from rig.experiment.errors import ExperimentError, LimitError
 from rig.link.client import RigLink
 from rig.record.reader import RunReader
-from rig.spec.workspace import Workspace, library_root
 from rig.studio.desk import LOST, Choice, Desk
 from rig.studio.errors import StudioError
 from rig.studio.live import live_route, message
 from rig.studio.seat import PATIENCE_S, Seat
 from rig.studio.watched import LEFT_BEHIND_S, Pace
+from tests.studio.lab import make_lab
 
 BEAM = Choice("bellow-bending", "virtual-beam", seed=1, speed=20.0)
-SPECS = Path(__file__).parents[1] / "specs"
 PATIENT_S = 60.0
 """Against a test that hangs; nothing is asserted of it."""
 
@@ -45,16 +43,7 @@ def clock() -> Clock:
 
 @pytest.fixture
 def desk(tmp_path: Path, clock: Clock) -> Iterator[Desk]:
-    for folder in ("models", "calibration"):
-        shutil.copytree(library_root() / folder, tmp_path / folder)
-    shutil.copy(SPECS / "bellow-bending.yaml", tmp_path / "models/actuators")
-    (tmp_path / "models/protocols/tiny.yaml").write_text(
-        "kind: protocol\nname: tiny\ndescription: two points\n"
-        "deformation:\n  pressures: {start: 0 kPa, stop: 2 kPa, step: 2 kPa}\n  repeats: 1\n"
-        "  descending_repeats: 0\n  conditioning: 0\n  rest: 1 s\n"
-        "  settling: {tolerance: 0.05 kPa, window: 1 s, timeout: 60 s}\n  hold: 1 s\n  frames: 1\n"
-    )
-    made = Desk(Workspace(tmp_path), Seat(clock))
+    made = Desk(make_lab(tmp_path), Seat(clock))
     yield made
     made.close()
     assert not made.is_open

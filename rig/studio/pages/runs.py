@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import asyncio
+from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 from nicegui import ui
 
+from rig.errors import RigError
 from rig.studio.errors import StudioError
 from rig.studio.files import inside
 from rig.studio.pages.frame import frame, say, telling
+from rig.studio.pages.replay import Played, ReplayPanel
 from rig.studio.pages.work import Progress
-from rig.studio.runs import RunRow, list_runs, matching
+from rig.studio.replay import MOST_REPLAYS
+from rig.studio.runs import RunRow, list_runs, matching, summary_of
 from rig.studio.state import Studio
 from rig.studio.works import comparison, report
 
@@ -41,6 +46,9 @@ class RunsPage:
                 ui.button("Open report", on_click=telling(self._open), color=None).classes(
                     "main"
                 ).props("unelevated")
+                ui.button("Replay", on_click=self._replay, color=None).classes("plain").props(
+                    "unelevated"
+                )
                 ui.button("Compare", on_click=telling(self._compare), color=None).classes(
                     "plain"
                 ).props("unelevated")
@@ -67,12 +75,13 @@ class RunsPage:
                 selection="multiple",
                 pagination=20,
                 on_select=self._chosen,
-            ).props("flat dense")
+            ).props("flat dense wrap-cells")
             self._nothing = ui.label(
                 "There is no run in this workspace yet: take one on the Bench page, or with "
                 "`rig characterise`."
             ).classes("muted")
             self._files = ui.row().classes("actions")
+        self._player = ReplayPanel()
         self._view = ui.element("iframe").classes("view").props('title="report"')
         self._view.set_visibility(False)
         self._show()
@@ -111,6 +120,20 @@ class RunsPage:
             raise StudioError("this run has no report: write it again.")
         self._show_page(_address(row.name, "report.html"))
 
+    async def _replay(self) -> None:
+        try:
+            names = [row.name for row in self._selected()]
+            if not 0 < len(names) <= MOST_REPLAYS:
+                raise StudioError(f"tick one run, or up to {MOST_REPLAYS} to play in step.")
+            folders = [inside(self._studio.workspace.logs, name) for name in names]
+            # a log takes a second to read: pages and bench go on meanwhile
+            self._player.play([await asyncio.to_thread(self._read, folder) for folder in folders])
+        except RigError as error:
+            say(str(error), "negative")
+
+    def _read(self, folder: Path) -> Played:
+        return Played(self._studio.replays.of(folder), summary_of(folder))
+
     def _report(self) -> None:
         folder = inside(self._studio.workspace.logs, self._one().name)
         self._progress.start(self._reported, report, folder)
@@ -136,5 +159,5 @@ class RunsPage:
         self._view.set_visibility(True)
 
 
-def _address(run: str, name: str) -> str:
-    return f"/runs/{quote(run, safe='')}/{quote(name, safe='')}"
+def _address(folder: str, name: str) -> str:
+    return f"/runs/{quote(folder, safe='')}/{quote(name, safe='')}"
