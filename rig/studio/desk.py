@@ -32,16 +32,18 @@ from rig.record.documents import PartDocument, PointDocument, PointKey
 from rig.spec.free_path import first_free
 from rig.spec.workspace import Setup, Workspace
 from rig.studio.errors import StudioError
+from rig.studio.look import NOTHING, Look, Lookout, grams
 from rig.studio.scope import Scope
 from rig.studio.seat import PATIENCE_S, Seat
-from rig.studio.watched import Pace, WatchedBench
+from rig.studio.watched import Glances, Pace, WatchedBench
+from rig.vision.measure import AngleMeter
 
 Opcode = Literal["home", "zero_pressure", "tare", "jog", "set_pressure", "hold", "clear_fault"]
 
 POLL_S = 0.02
 """Bench time of a poll while nobody asks for anything."""
-CAMERA_PERIOD_S = 0.5
-"""Bench time between pictures while no run takes its own."""
+CAMERA_PERIOD_S = 0.2
+"""Time between pictures while somebody looks, besides those that a run takes."""
 JOG_ML_S = 1.0
 LEAVE_S = 20.0
 """A thread that does not end within this time is left alone."""
@@ -94,7 +96,8 @@ class Desk:
     after_run: Callable[[Path], None] = lambda _folder: None
     scope: Scope = field(default_factory=Scope)
     activity: Activity = field(default_factory=Activity)
-    picture: bytes = b""
+    look: Look = NOTHING
+    """The last picture with what was measured in it, while somebody looks."""
     watchers: int = 0
     """Browsers that look at the camera."""
 
@@ -106,6 +109,15 @@ class Desk:
         self._saying = threading.Lock()
         self._thread: threading.Thread | None = None
         self._setup: Setup | None = None
+        self._lookout: Lookout | None = None
+
+    @property
+    def force_g(self) -> float | None:
+        """What presses on the load cell, in grams-force; None unless it is tared."""
+        reading, setup = self.scope.reading(), self._setup
+        if setup is None or reading.load_cell_counts is None or "tared" not in reading.flags:
+            return None
+        return grams(reading.load_cell_counts, setup.calibrations.load_cell)
 
     # --- asked by browsers -----------------------------------------------------------------
 
@@ -135,6 +147,7 @@ class Desk:
         self._orders = queue.SimpleQueue()
         self._setup = setup
         self.scope.forget()
+        self.look = NOTHING
         self._say(connected=setup.bench.name, doing="opening the bench", said="")
         self._thread = threading.Thread(
             target=self._serve, args=(choice, request), name="bench", daemon=True
@@ -211,6 +224,8 @@ class Desk:
     # --- the thread of the bench -----------------------------------------------------------
 
     def _serve(self, choice: Choice, request: RunRequest) -> None:
+        calibrations = request.setup.calibrations
+        self._lookout = Lookout(AngleMeter(calibrations.camera, calibrations.ruler), self._looked)
         try:
             wanted: _Take | None = None
             while not self._leave.is_set():
@@ -222,6 +237,7 @@ class Desk:
         except Exception as error:  # the page must not show a bench that nobody serves any more
             self._say(said=f"This is a defect in rig: {type(error).__name__}: {error}")
         finally:
+            self._lookout.close()
             self._say(connected="", doing="", done=0, total=0, question="")
 
     def _open(self, choice: Choice, request: RunRequest, folder: Path | None = None) -> Bench:
@@ -231,11 +247,14 @@ class Desk:
             truth = None if folder is None else truth_path(folder, 0)
             job = Job(FolderStore.of_user(), lambda _what, _progress: not self._leave.is_set())
             bench = VirtualBench(setup, choice.seed, truth, job=job)
-            pace = Pace(choice.speed)
+            pace, glances = Pace(choice.speed), self._glances()
         else:
             bench = RealBench(setup.bench, setup.calibrations.camera, self._ask)
-            pace = Pace(0.0)
-        return WatchedBench(bench, self.scope.seen, self._shown, pace)
+            pace, glances = Pace(0.0), None
+        return WatchedBench(bench, self.scope.seen, self._shown, pace, glances)
+
+    def _glances(self) -> Glances:
+        return Glances(CAMERA_PERIOD_S, lambda: self.watchers > 0)
 
     def _by_hand(self, choice: Choice, request: RunRequest) -> _Take | None:
         """Serve orders until a run is asked for or the bench is let go of; it is vented then."""
@@ -248,7 +267,7 @@ class Desk:
             write_parameters(link, request.board_parameters())
             link.raise_faults(False)
             self._say(doing="")
-            next_picture_s = link.now_s
+            glances = None if request.setup.bench.simulated else self._glances()
             while not self._leave.is_set():
                 if self._must_vent():
                     self._carry_out(link, "vent")
@@ -258,8 +277,7 @@ class Desk:
                 if order is not None:
                     self._carry_out(link, order.opcode, order.argument)
                 link.receive(POLL_S)
-                if self.watchers and link.now_s >= next_picture_s:
-                    next_picture_s = link.now_s + CAMERA_PERIOD_S
+                if glances is not None and glances.due():  # a simulated bench looks by itself
                     bench.camera.grab()
             return None
         finally:
@@ -346,8 +364,12 @@ class Desk:
         finally:
             self._say(question="")
 
-    def _shown(self, jpeg: bytes) -> None:
-        self.picture = jpeg
+    def _shown(self, time_s: float, jpeg: bytes) -> None:
+        if self.watchers and self._lookout is not None:
+            self._lookout.show(time_s, jpeg)
+
+    def _looked(self, look: Look) -> None:
+        self.look = look
 
     def _say(self, **changes: str | int) -> None:
         with self._saying:

@@ -15,6 +15,7 @@ from fastapi import APIRouter
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from rig.studio.desk import Desk
+from rig.studio.look import NOTHING
 
 PERIOD_S = 0.04
 QUIET_S = 0.5
@@ -65,16 +66,16 @@ class _Listener:
                 self._desk.seat.heard(self._session)
 
     async def tell(self) -> None:
-        number, picture = 0, b""
+        number, shown = 0, NOTHING
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):
             while True:
                 if self._unanswered < MOST_UNANSWERED:
                     text, number = message(self._desk, self._session, self._watch, number)
                     self._unanswered += 1
                     await self._socket.send_text(text)
-                    if self._watch and self._desk.picture is not picture:
-                        picture = self._desk.picture
-                        await self._socket.send_bytes(picture)
+                    if self._watch and self._desk.look is not shown:
+                        shown = self._desk.look
+                        await self._socket.send_bytes(shown.jpeg)
                 await asyncio.sleep(PERIOD_S if self._watch else QUIET_S)
 
 
@@ -82,13 +83,18 @@ def message(desk: Desk, session: str, watch: bool, number: int) -> tuple[str, in
     """What a browser is told, and the number of the last sample in it."""
     samples = desk.scope.since(number) if watch else []
     reading, activity, holder = desk.scope.reading(), desk.activity, desk.seat.holder
+    force, look = desk.force_g, desk.look
     content = {
         "connected": activity.connected,
         "state": reading.state if activity.connected else "",
         "fault": reading.fault if activity.connected else "none",
         "hint": reading.hint,
         "flags": ", ".join(reading.flags),
-        "counts": reading.load_cell_counts,
+        "force": None if force is None else round(force, 3),
+        "angle": None if look.angle_deg is None else round(look.angle_deg, 3),
+        "angle_u95": None if look.u95_deg is None else round(look.u95_deg, 3),
+        "angle_s": round(look.time_s, 3),
+        "no_angle": look.reason,
         "doing": activity.doing,
         "done": activity.done,
         "total": activity.total,

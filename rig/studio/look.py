@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import cv2
 
@@ -24,6 +26,12 @@ class Look:
     u95_deg: float | None = None
     reason: str = ""
     """Why there is no angle."""
+    time_s: float = 0.0
+    """Bench time of the picture."""
+
+
+NOTHING = Look(b"")
+"""No picture yet."""
 
 
 def looked_at(jpeg: bytes, meter: AngleMeter) -> Look:
@@ -45,3 +53,41 @@ def looked_at(jpeg: bytes, meter: AngleMeter) -> Look:
 def grams(counts: float, calibration: LoadCellCalibration) -> float:
     """Force in grams-force of load-cell counts, tare removed."""
     return calibration.corrected(counts / calibration.counts_per_gram / 1e3) * 1e3
+
+
+class Lookout:
+    """Measures the newest picture in a thread of its own, so that nobody waits for it, and tells.
+
+    Pictures that come while one is being measured replace each other.
+    """
+
+    def __init__(self, meter: AngleMeter, tell: Callable[[Look], None]) -> None:
+        self._meter = meter
+        self._tell = tell
+        self._changed = threading.Condition()
+        self._waiting: Look | None = None
+        self._closed = False
+        self._thread = threading.Thread(target=self._serve, name="lookout", daemon=True)
+        self._thread.start()
+
+    def show(self, time_s: float, jpeg: bytes) -> None:
+        """Look at this one next."""
+        with self._changed:
+            self._waiting = Look(jpeg, time_s=time_s)
+            self._changed.notify()
+
+    def close(self) -> None:
+        """Look at nothing any more."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify()
+        self._thread.join()
+
+    def _serve(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._closed or self._waiting is not None)
+                shown, self._waiting = self._waiting, None
+            if shown is None:
+                return
+            self._tell(replace(looked_at(shown.jpeg, self._meter), time_s=shown.time_s))

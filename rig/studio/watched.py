@@ -16,6 +16,8 @@ from rig.link.slcan import RawFrame
 
 Seen = Callable[[list[RawFrame], float], None]
 """Told the frames of a poll and the bench time after it."""
+Shown = Callable[[float, bytes], None]
+"""Told the bench time and the JPEG of a picture."""
 
 LEFT_BEHIND_S = 0.5
 """A bench further behind its pace than this gives up catching up."""
@@ -55,6 +57,7 @@ class WatchedBus:
     bus: FrameBus
     seen: Seen
     pace: Pace
+    glance: Callable[[], None]
 
     @property
     def name(self) -> str:
@@ -74,6 +77,7 @@ class WatchedBus:
         """Let bench time pass; return the frames received, oldest first."""
         frames = self.bus.poll(duration_s)
         self.seen(frames, self.bus.now_s)
+        self.glance()
         self.pace.keep(self.bus.now_s)
         return frames
 
@@ -91,24 +95,57 @@ class WatchedCamera:
     """A camera whose pictures are shown as well."""
 
     taken: Camera
-    shown: Callable[[bytes], None]
+    shown: Shown
 
     def grab(self) -> tuple[float, bytes]:
         """Bench time in seconds and the JPEG of a frame taken now."""
         time_s, jpeg = self.taken.grab()
-        self.shown(jpeg)
+        self.shown(time_s, jpeg)
         return time_s, jpeg
 
 
-class WatchedBench:
-    """A bench, open, whose frames and pictures are seen."""
+class Glances:
+    """When it is time for another picture to look at: on the clock's time, while somebody looks."""
 
     def __init__(
-        self, bench: Bench, seen: Seen, shown: Callable[[bytes], None], pace: Pace
+        self,
+        period_s: float,
+        somebody_looks: Callable[[], bool],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._period_s = period_s
+        self._somebody_looks = somebody_looks
+        self._clock = clock
+        self._next_s = clock()
+
+    def due(self) -> bool:
+        """True once for each picture."""
+        now_s = self._clock()
+        if now_s < self._next_s or not self._somebody_looks():
+            return False
+        self._next_s = now_s + self._period_s
+        return True
+
+
+class WatchedBench:
+    """A bench, open, whose frames and pictures are seen.
+
+    The simulated camera is also looked through between the pictures that are asked for, which
+    changes none of them. A real one is not: the link would wait for its exposure.
+    """
+
+    def __init__(
+        self, bench: Bench, seen: Seen, shown: Shown, pace: Pace, glances: Glances | None
     ) -> None:
         self._bench = bench
-        self.bus: FrameBus = WatchedBus(bench.bus, seen, pace)
+        self._shown = shown
+        self._glances = glances
+        self.bus: FrameBus = WatchedBus(bench.bus, seen, pace, self._glance)
         self.camera: Camera = WatchedCamera(bench.camera, shown)
+
+    def _glance(self) -> None:
+        if self._glances is not None and self._glances.due():
+            self._shown(*self._bench.camera.grab())
 
     def mount(self, fixture: Fixture) -> None:
         """Arrange the bench as `fixture` says."""

@@ -13,8 +13,11 @@ from fastapi import FastAPI
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
-from rig.experiment.bench import Bench
+from rig.board.virtual import VirtualBench
+from rig.experiment.bench import Bench, Nobody
 from rig.experiment.errors import ExperimentError, LimitError
+from rig.experiment.request import make_request
+from rig.experiment.run import new_run
 from rig.link.client import RigLink
 from rig.record.reader import RunReader
 from rig.studio.desk import LOST, Choice, Desk
@@ -58,7 +61,8 @@ def until(condition: Callable[[], bool]) -> None:
 
 def connected(desk: Desk, choice: Choice = BEAM) -> None:
     desk.take_control("me")
-    desk.connect("me", choice)
+    if not desk.is_open:
+        desk.connect("me", choice)
     until(lambda: desk.scope.reading().state == "idle" and not desk.activity.doing)
 
 
@@ -216,8 +220,55 @@ def test_a_run_is_recorded_as_from_the_command_line_and_the_bench_comes_back(des
     reader = RunReader(folders[0])
     assert reader.complete
     assert len(reader.points()) == 2
-    assert desk.picture.startswith(b"\xff\xd8")
     until(lambda: desk.scope.reading().state == "idle")
+
+
+def test_a_run_that_is_looked_at_measures_the_same(
+    desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rig.studio.desk.CAMERA_PERIOD_S", 0.5)
+    folders: list[Path] = []
+    desk.after_run = folders.append
+    desk.watchers = 1
+    connected(desk, replace(BEAM, speed=0.0))
+    desk.take("me", "tiny")
+    until(lambda: bool(folders))
+    setup = desk.workspace.setup(BEAM.actuator, BEAM.bench, "tiny")
+    bench = VirtualBench(setup, BEAM.seed, None)
+    new_run(tmp_path / "alone", bench, make_request(setup, BEAM.seed), Nobody())
+    bench.close()
+    alone, watched = RunReader(tmp_path / "alone"), RunReader(folders[0])
+    assert watched.points() == alone.points()
+    assert [i.jpeg for i in watched.images()] == [i.jpeg for i in alone.images()]
+    until(lambda: desk.look.time_s > 0)
+    assert desk.look.time_s not in {image.time_s for image in alone.images()}
+
+
+def test_angle_and_force_come_from_picture_and_load_cell(desk: Desk) -> None:
+    desk.watchers = 1
+    connected(desk)
+    until(lambda: desk.look.angle_deg is not None)
+    at_rest = desk.look.angle_deg
+    assert at_rest is not None
+    assert abs(at_rest) < 10.0
+    assert desk.force_g is None
+    desk.order("me", "tare")
+    until(lambda: desk.force_g is not None)
+    assert desk.force_g == pytest.approx(0.0, abs=1.0)
+    pressurised(desk)
+    bent_s = desk.look.time_s + 2.0
+    until(lambda: desk.look.time_s > bent_s)
+    assert desk.look.angle_deg is not None
+    assert desk.look.angle_deg > at_rest + 20.0
+    assert desk.look.u95_deg is not None
+    assert 0.0 < desk.look.u95_deg < 3.0
+    assert desk.look.jpeg.startswith(b"\xff\xd8")
+
+
+def test_who_does_not_look_costs_nothing(desk: Desk) -> None:
+    connected(desk)
+    until(lambda: desk.scope.reading().time_s > 2.0)
+    assert desk.look.jpeg == b""
 
 
 def test_what_is_asked_for_while_a_run_begins_is_not_done_after_it(

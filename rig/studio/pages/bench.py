@@ -22,13 +22,15 @@ ORDERS: tuple[tuple[str, Opcode, float], ...] = (
     ("Clear fault", "clear_fault", 0.0),
 )
 FIGURES = (
-    ("pressure", "kPa"),
-    ("setpoint", "kPa"),
-    ("plunger", "mL"),
-    ("counts", ""),
-    ("state", ""),
-    ("time", "s"),
+    ("pressure", "pressure", "kPa"),
+    ("set-point", "setpoint", "kPa"),
+    ("angle", "angle", "deg"),
+    ("force", "force", "g"),
+    ("plunger", "plunger", "mL"),
+    ("state", "state", ""),
+    ("time", "time", "s"),
 )
+"""What is told live: its name, its key, its unit. All of it comes through the sensors."""
 SPEEDS = {1.0: "real time", 4.0: "4 x", 20.0: "20 x", 0.0: "as fast as it can"}
 FIRST = {"actuator": "bellow-bending", "bench": "virtual-beam", "protocol": "quick"}
 
@@ -106,11 +108,12 @@ class BenchPage:
         with ui.column().classes("panel"):
             heading("Board")
             cells = "".join(
-                f'<div><span class="muted">{name}</span><b data-live="{name}">-</b> {unit}</div>'
-                for name, unit in FIGURES
+                f'<div><span class="muted">{name}</span><b data-live="{key}">-</b> {unit}</div>'
+                for name, key, unit in FIGURES
             )
             ui.html(
                 f'<div class="meters figures">{cells}</div><p class="muted" data-live="flags"></p>'
+                '<p class="muted" data-live="notes"></p>'
                 '<p class="problem" data-live="fault" role="alert" hidden></p>'
                 '<p class="caution" data-live="said" role="status" hidden></p>',
                 sanitize=False,
@@ -130,7 +133,10 @@ class BenchPage:
         with ui.column().classes("panel"):
             heading("Camera")
             ui.html(
-                '<img data-live="camera" alt="side view of the actuator" hidden>', sanitize=False
+                '<img data-live="camera" alt="side view of the actuator" hidden>'
+                '<p class="muted">Cyan and orange: the edges that the angle is measured between; '
+                "green: the marks of the ruler.</p>",
+                sanitize=False,
             )
 
     def _names(self, kind: str) -> ui.select:

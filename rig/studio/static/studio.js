@@ -1,6 +1,7 @@
 "use strict";
 /* The live connection: shows what the bench says, and answers, which keeps the seat. */
 const SHOWN_S = 30;
+const STALE_S = 1.5;
 let live = null;
 let trace = [];
 let pictureUrl = null;
@@ -43,7 +44,8 @@ function showBench(news) {
   tell("control", news.control);
   tell("state", news.connected ? news.state : "no bench");
   tell("flags", news.flags);
-  tell("counts", news.counts === null ? "-" : news.counts.toFixed(0));
+  tell("force", news.force === null ? "-" : news.force.toFixed(2));
+  tell("angle", news.angle === null ? "-" : news.angle.toFixed(1));
   tellIfAny("fault", fault);
   tellIfAny("said", news.said);
   tellIfAny("question", news.question ? `${news.question}, then press "Done as asked".` : "");
@@ -61,7 +63,20 @@ function showBench(news) {
   tell("pressure", last[1].toFixed(2));
   tell("setpoint", last[2].toFixed(2));
   tell("plunger", last[3].toFixed(2));
+  tell("notes", notes(news, last[0]));
   drawTrace();
+}
+
+function notes(news, now) {
+  const said = [];
+  const age = now - news.angle_s;
+  if (news.no_angle) said.push(`No angle: ${news.no_angle}.`);
+  else if (news.angle !== null) {
+    said.push(`The angle is known within ${news.angle_u95.toFixed(1)} deg (95 %)` +
+      (age > STALE_S ? `, from a picture ${age.toFixed(0)} s old.` : "."));
+  }
+  if (news.force === null && news.connected) said.push("No force: the load cell is not tared.");
+  return said.join(" ");
 }
 
 function drawTrace() {
