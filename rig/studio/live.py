@@ -67,6 +67,8 @@ class _Listener:
 
     async def tell(self) -> None:
         number, shown = 0, NOTHING
+        clock = asyncio.get_running_loop().time
+        next_s = clock()
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):
             while True:
                 if self._unanswered < MOST_UNANSWERED:
@@ -76,7 +78,9 @@ class _Listener:
                     if self._watch and self._desk.look is not shown:
                         shown = self._desk.look
                         await self._socket.send_bytes(shown.jpeg)
-                await asyncio.sleep(PERIOD_S if self._watch else QUIET_S)
+                # what sending took does not make messages rarer; what was missed is not made up for
+                next_s = max(next_s + (PERIOD_S if self._watch else QUIET_S), clock())
+                await asyncio.sleep(next_s - clock())
 
 
 def message(desk: Desk, session: str, watch: bool, number: int) -> tuple[str, int]:

@@ -83,7 +83,7 @@ function drawTrace() {
   const canvas = shown("trace");
   const style = getComputedStyle(document.body);
   const colour = (name) => style.getPropertyValue(name).trim();
-  const width = canvas.width, height = canvas.height, left = 52, bottom = 24, top = 8;
+  const width = canvas.width, height = canvas.height, left = 52, bottom = 24, top = 24;
   const pen = canvas.getContext("2d");
   const end = trace[trace.length - 1][0];
   let low = 0, high = 1;
@@ -105,7 +105,7 @@ function drawTrace() {
     pen.beginPath(); pen.moveTo(left, y(kpa)); pen.lineTo(width, y(kpa)); pen.stroke();
     pen.fillText(kpa.toFixed(step < 1 ? 1 : 0), 18, y(kpa) + 5);
   }
-  pen.fillText("kPa", 0, height - 6);
+  pen.fillText("kPa", 0, 14);
   pen.fillText(`${end.toFixed(0)} s`, width - 50, height - 6);
   const line = (column, name, dashes) => {
     pen.strokeStyle = colour(name);
