@@ -124,15 +124,14 @@ def _write_deck(
     path: Path, spec: ActuatorSpec, model: DeckModel, program: Program, pressure: float
 ) -> None:
     from rig.mechanics.deck import elements as deck
-    from rig.mechanics.deck.write import write_deck
+    from rig.mechanics.deck.write import modelled_part, write_deck
 
     chosen = deck.Program(program.value)
     write_deck(path, model, pressure=pressure, program=chosen, title=spec.name)
     d = model.model.discretisation
-    part = "half" if len(model.planes) == 1 else "a quarter"
     typer.echo(
         f"{path}: {len(d.connectivity)} {deck.elements_of(d).type.names[chosen]} for {program}, "
-        f"{part} of the actuator, up to {pressure / 1e3:g} kPa; mm, N, MPa"
+        f"{modelled_part(model)} of the actuator, up to {pressure / 1e3:g} kPa; mm, N, MPa"
     )
 
 

@@ -24,12 +24,20 @@ from pydantic import TypeAdapter
 
 from rig.mechanics.deck.write import write_deck
 from rig.mechanics.fe import Point, follow
+from rig.mechanics.mesh.bellow_axisymmetric import AxisymmetricResolution
+from rig.mechanics.mesh.bellow_joint import JointResolution
 from rig.mechanics.mesh.bellow_tetrahedra import mesh_bending_bellow_tetrahedra
+from rig.mechanics.simulate.axisymmetric import axisymmetric_model
 from rig.mechanics.simulate.bending import BendingModel, bending_model, bending_model_on
-from rig.spec.actuator import BellowBendingGeometry
+from rig.mechanics.simulate.joint import JointModel, joint_model
+from rig.spec.actuator import (
+    BellowAxisymmetricGeometry,
+    BellowBendingGeometry,
+    BellowJointGeometry,
+)
 from rig.spec.hyperelastic import HyperelasticSpec
 from rig.spec.material import MaterialSpec
-from rig.spec.workspace import Workspace
+from rig.spec.workspace import Workspace, library_root
 
 TARGET = 5e-4
 LIMIT_S = 3600.0
@@ -104,6 +112,7 @@ def main() -> None:
         count = len(model.soft.elements)
         print(f"  {count} mixed hexahedra: {mixed.angles[-1]:.4f} deg in {mixed.seconds:.1f} s")
     _energies(short, material)
+    _of_revolution()
 
 
 def _energies(geometry: BellowBendingGeometry, material: MaterialSpec) -> None:
@@ -118,6 +127,41 @@ def _energies(geometry: BellowBendingGeometry, material: MaterialSpec) -> None:
         theirs = calculix(model, 1e3)
         a, b = ours.angles[-1], theirs.angles[-1]
         print(f"{name:<24}{a:>12.4f}{b:>12.4f}{_difference(a, b):>12}")
+
+
+def _of_revolution() -> None:
+    """Exported meridians: CalculiX has eight nodes an element and no pressures of their own."""
+    print("\nbodies of revolution, rise of the top in mm")
+    library = Workspace(library_root(), is_library=True)
+    folded = BellowJointGeometry(family="bellow-joint", bellow_number=2)
+    cusped = BellowAxisymmetricGeometry(family="bellow-axisymmetric")
+    eva, silicone = library.material("eva-18"), library.material("dragon-skin-30")
+    cases = [
+        ("joint, elastic-plastic, 54 kPa", 54e3, joint_model(folded, eva, resolution=n))
+        for n in (JointResolution(), JointResolution(wall=4, fifth=6))
+    ]
+    cases += [
+        (
+            f"axisymmetric, 2 kPa, level {level}",
+            2e3,
+            axisymmetric_model(cusped, silicone, resolution=AxisymmetricResolution.level(level)),
+        )
+        for level in (1, 2, 3)
+    ]
+    for name, pressure, model in cases:
+        result = follow(model.model, [Point(pressure / 2), Point(pressure)])
+        ours = 1e3 * model.measures(result.solutions[-1])["displacement"]
+        d = model.model.discretisation
+        node = model.top if isinstance(model, JointModel) else model.top_centre
+        with tempfile.TemporaryDirectory() as folder:
+            write_deck(Path(folder) / "body.inp", model, pressure=pressure, increments=2)
+            _run("body", folder)
+            printed = (Path(folder) / "body.dat").read_text(encoding="ascii")
+        theirs = float(re.findall(rf"^ +{node + 1} +\S+ +(\S+)", printed, re.MULTILINE)[-1])
+        print(
+            f"{name:<34}{len(d.connectivity):>8}{ours:>12.4f}{theirs:>12.4f}"
+            f"{100 * (theirs / ours - 1):>+9.2f} %"
+        )
 
 
 def missing() -> str | None:
@@ -146,15 +190,7 @@ def calculix(model: BendingModel, pressure: float) -> Outcome:
     with tempfile.TemporaryDirectory() as folder:
         write_deck(Path(folder) / "bellow.inp", model, pressure=pressure, increments=INCREMENTS)
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        run = subprocess.run(
-            ["ccx", "bellow"],
-            cwd=folder,
-            env={**os.environ, "OMP_NUM_THREADS": "1"},
-            capture_output=True,
-            text=True,
-            timeout=LIMIT_S,
-            check=False,
-        )
+        run = _run("bellow", folder)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         printed = (Path(folder) / "bellow.dat").read_text(encoding="ascii")
     turns = {
@@ -167,6 +203,18 @@ def calculix(model: BendingModel, pressure: float) -> Outcome:
         raise RuntimeError(f"CalculiX did not get there:\n{run.stdout[-2000:]}")
     seconds = (after.ru_utime + after.ru_stime) - (before.ru_utime + before.ru_stime)
     return Outcome(tuple(float(np.degrees(a)) for a in found), seconds)
+
+
+def _run(name: str, folder: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        ["ccx", name],
+        cwd=folder,
+        env={**os.environ, "OMP_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        timeout=LIMIT_S,
+        check=False,
+    )
 
 
 def _difference(ours: float, theirs: float) -> str:

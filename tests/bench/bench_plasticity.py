@@ -18,7 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rig.mechanics.fe import Discretisation, Point, follow
+from rig.mechanics.deck.elements import elements_of
+from rig.mechanics.fe import Point, follow
 from rig.mechanics.mesh.bellow_joint import JointResolution
 from rig.mechanics.simulate.joint import JointModel, joint_model
 from rig.spec.actuator import BellowJointGeometry
@@ -88,7 +89,7 @@ def lines(actuator: JointModel, material: MaterialSpec) -> list[str]:
     d = actuator.model.discretisation
     flow = material.plasticity
     assert flow is not None
-    elements = d.connectivity[:, eight_nodes(d)]
+    elements = elements_of(d).nodes
     used = np.unique(elements)
     hardened = (flow.yield_stress + flow.hardening_modulus) / MEGAPASCAL
     deck = ["*NODE, NSET=ALL"]
@@ -119,15 +120,3 @@ def lines(actuator: JointModel, material: MaterialSpec) -> list[str]:
         "RF",
         "*END STEP",
     ]
-
-
-def eight_nodes(d: Discretisation) -> list[int]:
-    """scikit-fem's numbers of an element's corners, then its edges' middles, counter-clockwise."""
-    corners = [(0, 0), (1, 0), (1, 1), (0, 1)]
-    middles = [(0.5, 0), (1, 0.5), (0.5, 1), (0, 0.5)]
-    places = np.asarray(d.element.doflocs)
-    order = [int(np.argmin(np.abs(places - p).sum(axis=1))) for p in (*corners, *middles)]
-    centre = places.mean(axis=0)[:, None]
-    if d.mesh.mapping().detDF(centre)[0, 0] < 0:  # numbered clockwise: the mesh makes them alike
-        order = [order[i] for i in (0, 3, 2, 1, 7, 6, 5, 4)]
-    return order

@@ -10,15 +10,16 @@ from rig.spec.material import MaterialSpec
 
 
 def deck_model(actuator: ActuatorSpec, material: MaterialSpec) -> DeckModel:
-    """The model of predictions with its tip free; raises DeckError where it is no solid in space.
+    """The model of predictions with its tip free.
 
-    MechanicsError for a material without a volumetric energy.
+    Raises DeckError where a deck cannot say what it is made of, MechanicsError for a material
+    without a volumetric energy.
     """
     family = actuator.geometry.family
     model = FAMILIES[family].model.free(actuator.geometry, material)
     if not isinstance(model, DeckModel):
         raise DeckError(
-            f"there is no input deck of the family '{family}' yet: decks are made of solids in "
-            "space. Export it as STL or STEP."
+            f"there is no input deck of the family '{family}': decks cannot say what its model is "
+            f"made of. Export it as STL or STEP."
         )
     return model

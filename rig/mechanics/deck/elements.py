@@ -16,7 +16,7 @@ import skfem
 from numpy.typing import NDArray
 
 from rig.mechanics.deck.errors import DeckError
-from rig.mechanics.fe import Discretisation
+from rig.mechanics.fe import Discretisation, Kinematics
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -36,7 +36,7 @@ class ElementType:
     names: Mapping[Program, str]
     """Abaqus has hybrid elements for nearly incompressible materials. CalculiX has not: there
     reduced integration keeps hexahedra from locking, tetrahedra stay too stiff."""
-    corners: tuple[tuple[float, float, float], ...]
+    corners: tuple[tuple[float, ...], ...]
     """In the reference element of scikit-fem, right-handed."""
     edges: tuple[tuple[int, int], ...]
     """Corners (from 0) of the edges whose middles follow."""
@@ -67,6 +67,14 @@ HEXAHEDRON = ElementType(
     faces=((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
     mirrored=(4, 5, 6, 7, 0, 1, 2, 3),
 )
+QUADRILATERAL = ElementType(
+    names={Program.ABAQUS: "CAX8RH", Program.CALCULIX: "CAX8R"},
+    corners=((0, 0), (1, 0), (1, 1), (0, 1)),
+    edges=((0, 1), (1, 2), (2, 3), (3, 0)),
+    faces=((0, 1), (1, 2), (2, 3), (3, 0)),
+    mirrored=(0, 3, 2, 1),
+)
+"""Of a meridian, r and z as x and y."""
 
 
 @dataclass(frozen=True)
@@ -79,16 +87,25 @@ class Elements:
 
 
 def elements_of(discretisation: Discretisation) -> Elements:
-    """The elements in the other programs' order; raises DeckError for plane ones.
+    """The elements in the other programs' order; raises DeckError for those of plane strain.
 
-    Of 27-node hexahedra the 20 nodes on edges are kept: CalculiX has no others.
+    Of 27-node hexahedra and 9-node quadrilaterals the nodes on edges are kept: CalculiX has no
+    others.
     """
     d = discretisation
-    kinds = ((skfem.ElementTetP2, TETRAHEDRON), (skfem.ElementHex2, HEXAHEDRON))
-    kind = next((kind for element, kind in kinds if isinstance(d.element, element)), None)
+    kinds = (
+        (skfem.ElementTetP2, Kinematics.SOLID, TETRAHEDRON),
+        (skfem.ElementHex2, Kinematics.SOLID, HEXAHEDRON),
+        (skfem.ElementQuad2, Kinematics.AXISYMMETRIC, QUADRILATERAL),
+    )
+    kind = next(
+        (kind for element, how, kind in kinds if (type(d.element), d.kinematics) == (element, how)),
+        None,
+    )
     if kind is None:
         raise DeckError(
-            f"a deck is made of tetrahedra or hexahedra, not of {type(d.mesh).__name__}."
+            f"a deck is made of tetrahedra, hexahedra or a meridian's quadrilaterals, not of "
+            f"{type(d.mesh).__name__} in {d.kinematics.value}."
         )
     places = np.asarray(d.element.doflocs)
     straight = range(len(kind.corners))

@@ -1,4 +1,4 @@
-"""Our energies as `*HYPERELASTIC` of Abaqus and CalculiX, in N and mm.
+"""Our materials as `*HYPERELASTIC`, or `*ELASTIC` and `*PLASTIC`, of Abaqus and CalculiX: N, mm.
 
 Both write U = W(I1, I2 or stretches, isochoric) + sum (J - 1)^2i / Di, so that K = 2 / D1; the
 Arruda-Boyce model alone has U(J) = ((J^2 - 1)/2 - ln J) / D, which is our logarithmic function
@@ -15,6 +15,7 @@ from rig.mechanics.hyperelastic import (
     ArrudaBoyce,
     Energy,
     Flowing,
+    HenckyVolume,
     LogarithmicVolume,
     MooneyRivlin,
     NeoHookean,
@@ -23,8 +24,14 @@ from rig.mechanics.hyperelastic import (
     Volumetric,
     Yeoh,
 )
+from rig.mechanics.plasticity import J2Plasticity
 
 _MEGAPASCAL = 1e6
+
+
+Table = tuple[tuple[float, ...], ...]
+_PER_LINE = 8
+"""Constants of a data line at most, in both programs."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +41,60 @@ class Hyperelasticity:
     model: str
     constants: tuple[float, ...]
     remark: str = ""
+
+    @property
+    def keywords(self) -> tuple[tuple[str, Table], ...]:
+        """The keyword and its data lines."""
+        c = self.constants
+        lines = tuple(c[i : i + _PER_LINE] for i in range(0, len(c), _PER_LINE))
+        return ((f"HYPERELASTIC, {self.model}", lines),)
+
+
+@dataclass(frozen=True)
+class Elastoplasticity:
+    """J2 flow with linear hardening; moduli and stress in MPa."""
+
+    young_modulus: float
+    poisson_ratio: float
+    yield_stress: float
+    hardening_modulus: float
+    remark: str = (
+        "J2 flow beside Hencky's elasticity; other elastic laws are the same at small strains only"
+    )
+
+    @property
+    def keywords(self) -> tuple[tuple[str, Table], ...]:
+        """The keywords and their data lines."""
+        virgin: Table = ((self.yield_stress, 0.0),)
+        # both programs take the last stress of the table for all strains beyond it
+        flowing = (
+            ((self.yield_stress + _STRAIN * self.hardening_modulus, _STRAIN),)
+            if self.hardening_modulus
+            else ()
+        )
+        return (
+            ("ELASTIC", ((self.young_modulus, self.poisson_ratio),)),
+            ("PLASTIC", virgin + flowing),
+        )
+
+
+_STRAIN = 10.0
+"""Plastic strain to which hardening is written."""
+
+
+def material_law(
+    distortion: Energy | Flowing, volume: Volumetric
+) -> Hyperelasticity | Elastoplasticity:
+    """What stands for two energies; raises DeckError where nothing does."""
+    if isinstance(distortion, J2Plasticity) and isinstance(volume, HenckyVolume):
+        g, k = distortion.shear_modulus, volume.bulk_modulus
+        return Elastoplasticity(
+            9 * k * g / (3 * k + g) / _MEGAPASCAL,
+            (3 * k - 2 * g) / (6 * k + 2 * g),
+            distortion.yield_stress / _MEGAPASCAL,
+            distortion.hardening_modulus / _MEGAPASCAL,
+        )
+    return hyperelasticity(distortion, volume)
 
 
 def hyperelasticity(distortion: Energy | Flowing, volume: Volumetric) -> Hyperelasticity:

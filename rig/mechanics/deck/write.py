@@ -1,6 +1,6 @@
-"""An actuator in space as an input deck (`.inp`) of Abaqus or CalculiX: mm, N, MPa, tonne, s.
+"""An actuator as an input deck (`.inp`) of Abaqus or CalculiX: mm, N, MPa, tonne, s.
 
-The same mesh, sets, material, rigid cap and loads as the finite element model it is made from:
+The same mesh, sets, material, rigid cap if any, and loads as the finite element model it is of:
 first its weight, then the pressure of the cavity, which follows the deformed surface because the
 steps are geometrically nonlinear. Keywords after the Abaqus Keywords Guide and CalculiX CrunchiX
 User's Manual 2.20. The two part in the elements' names, and where CalculiX gives a rigid body's
@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from rig.mechanics.deck.elements import Elements, Program, elements_of, faces_of
 from rig.mechanics.deck.errors import DeckError
-from rig.mechanics.deck.material import hyperelasticity
-from rig.mechanics.fe import Model, RigidBody, Solid
+from rig.mechanics.deck.material import material_law
+from rig.mechanics.fe import Kinematics, Model, RigidBody, Solid
 from rig.mechanics.fe.rigid import MOTIONS
 
 Indices = NDArray[np.int64]
@@ -30,6 +30,10 @@ _MEGAPASCAL = 1e6
 _PER_LINE = 16
 """Entries of a data line at most, in both programs."""
 _REPORTED = "REPORTED"
+_AXES = {
+    Kinematics.SOLID: "x along the axis; y = 0 is a plane of symmetry.",
+    Kinematics.AXISYMMETRIC: "x along the radius, y along the axis of revolution.",
+}
 _SOLIDS = ("SOFT", "LAYER")
 """Element sets of a model's solids, in their order."""
 
@@ -40,12 +44,13 @@ class DeckModel(Protocol):
 
     @property
     def model(self) -> Model:
-        """Solids, one rigid cap and the cavity; its boundaries `clamped` and `cap`."""
+        """Solids, a rigid cap or none, and the cavity; boundaries `clamped` and `cap` or `top`."""
         ...
 
     @property
     def planes(self) -> Mapping[str, int]:
-        """Boundaries on planes of symmetry, to the component of displacement that they hold."""
+        """Boundaries on planes or the axis of symmetry, to the component of displacement that
+        they hold."""
         ...
 
     @property
@@ -57,6 +62,13 @@ class DeckModel(Protocol):
     def acceleration(self) -> tuple[float, float, float]:
         """Gravity in m/s2."""
         ...
+
+
+def modelled_part(actuator: DeckModel) -> str:
+    """What symmetry leaves of the actuator, in words."""
+    if actuator.model.discretisation.kinematics is Kinematics.AXISYMMETRIC:
+        return "the meridian"
+    return {1: "half", 2: "a quarter"}[len(actuator.planes)]
 
 
 def write_deck(
@@ -87,33 +99,35 @@ def _lines(
 ) -> Iterator[str]:
     d = actuator.model.discretisation
     elements = elements_of(d)
-    cap = actuator.model.bodies[0]
+    cap = next(iter(actuator.model.bodies), None)
     used = np.unique(elements.nodes)
     reference, rotation = len(d.nodes) + 1, len(d.nodes) + 2
-    own_rotation = program is Program.CALCULIX
+    calculix = program is Program.CALCULIX
 
     yield "*HEADING"
-    part = {1: "half", 2: "a quarter"}[len(actuator.planes)]
-    yield f"{title or 'actuator'}: {part} of it, by rig"
-    yield "** Units: mm, N, MPa, tonne, s. x along the axis; y = 0 is a plane of symmetry."
-    yield f"** Weight of the modelled part of the cap: {cap.weight[0]:.6g} N."
+    yield f"{title or 'actuator'}: {modelled_part(actuator)} of it, by rig"
+    yield "** Units: mm, N, MPa, tonne, s."
+    yield f"** {_AXES[d.kinematics]}"
+    if cap is not None:
+        yield f"** Weight of the modelled part of the cap: {cap.weight[0]:.6g} N."
     yield "*NODE, NSET=ALL"
     for node in used:
         yield _row(node + 1, *(_MM * d.nodes[node]))
-    yield "*NODE, NSET=CAP_REFERENCE"
-    yield _row(reference, *(_MM * cap.centre))
-    if own_rotation:
-        yield "*NODE, NSET=CAP_ROTATION"
-        yield _row(rotation, *(_MM * cap.centre))
+    reported = ["TOP"]
+    if cap is not None:
+        reported = ["CAP_REFERENCE", "CAP_ROTATION"] if calculix else ["CAP_REFERENCE"]
+        for name, node in zip(reported, (reference, rotation), strict=False):
+            yield f"*NODE, NSET={name}"
+            yield _row(node, *(_MM * cap.centre))
     for name, solid in zip(_SOLIDS, actuator.model.solids, strict=False):
         yield f"*ELEMENT, TYPE={elements.type.names[program]}, ELSET={name}"
         for number in solid.elements:
             yield from _rows((number + 1, *(elements.nodes[number] + 1)), carry_on=True)
 
-    cap_nodes = np.intersect1d(cap.nodes, used)
+    cap_nodes = np.intersect1d(() if cap is None else cap.nodes, used)
     # the cap's own freedoms decide about its nodes on planes of symmetry
     supports = {
-        "CLAMPED": (np.intersect1d(d.nodes_on("clamped"), used), (1, 3)),
+        "CLAMPED": (np.intersect1d(d.nodes_on("clamped"), used), (1, d.dim)),
         **{
             name.upper(): (
                 np.setdiff1d(np.intersect1d(d.nodes_on(name), used), cap_nodes),
@@ -122,18 +136,23 @@ def _lines(
             for name, component in actuator.planes.items()
         },
     }
-    sets = {name: nodes for name, (nodes, _) in supports.items()} | {"CAP": cap_nodes}
+    end = {"TOP": np.intersect1d(d.nodes_on("top"), used)} if cap is None else {"CAP": cap_nodes}
+    sets = {name: nodes for name, (nodes, _) in supports.items()} | end
     for name, nodes in sets.items():
         yield f"*NSET, NSET={name}"
         yield from _rows(nodes + 1)
-    if own_rotation:
+    if calculix:
         # CalculiX cuts its increments as it likes; at these it stops and prints
         yield f"*TIME POINTS, NAME={_REPORTED}"
         times = [number / increments for number in range(1, increments + 1)]
         yield from (_row(*times[i : i + 8]) for i in range(0, increments, 8))
     faces = yield from _surfaces(actuator, elements)
     yield from _material(actuator)
-    yield from _cap(cap, reference, rotation if own_rotation else None)
+    if cap is not None:
+        yield _rigid(reference, rotation if calculix else None)
+    yield "*BOUNDARY"
+    if cap is not None:
+        yield from _held(cap, reference, rotation if calculix else None)
     for name, (_, (first, last)) in supports.items():
         yield f"{name}, {first}, {last}"
 
@@ -146,15 +165,15 @@ def _lines(
         for name in _SOLIDS[: len(actuator.model.solids)]:
             yield f"{name}, GRAV, {pull}"
         yield "*CLOAD"
-        for component, force in enumerate(cap.weight, start=1):
+        for component, force in enumerate(() if cap is None else cap.weight, start=1):
             if force:
                 yield f"{reference}, {component}, {force:.9g}"
-        yield from _output(own_rotation)
+        yield from _output(reported, calculix)
     yield from _step(increments)
     yield "*DLOAD"
     for face in faces:
         yield f"CAVITY_{face}, P{face}, {pressure / _MEGAPASCAL:.9g}"
-    yield from _output(own_rotation)
+    yield from _output(reported, calculix)
 
 
 def _surfaces(actuator: DeckModel, elements: Elements) -> Generator[str, None, list[int]]:
@@ -177,25 +196,27 @@ def _material(actuator: DeckModel) -> Iterator[str]:
 
 
 def _section(name: str, solid: Solid, density: float) -> Iterator[str]:
-    law = hyperelasticity(solid.distortion, solid.volume)
-    yield f"*SOLID SECTION, ELSET={name}, MATERIAL={name}_ELASTOMER"
+    law = material_law(solid.distortion, solid.volume)
+    yield f"*SOLID SECTION, ELSET={name}, MATERIAL={name}_MATERIAL"
     yield ""
-    yield f"*MATERIAL, NAME={name}_ELASTOMER"
+    yield f"*MATERIAL, NAME={name}_MATERIAL"
     if law.remark:
         yield f"** {law.remark}"
-    yield f"*HYPERELASTIC, {law.model}"
-    yield from (_row(*law.constants[i : i + 8]) for i in range(0, len(law.constants), 8))
+    for keyword, lines in law.keywords:
+        yield f"*{keyword}"
+        yield from (_row(*line) for line in lines)
     yield "*DENSITY"
     yield f"{density * _TONNE_PER_MM3:.9g}"
 
 
-def _cap(cap: RigidBody, reference: int, rotation: int | None) -> Iterator[str]:
-    """The rigid cap and the motions that it may not do, under `*BOUNDARY`."""
+def _rigid(reference: int, rotation: int | None) -> str:
     if rotation is None:
-        yield f"*RIGID BODY, REF NODE={reference}, TIE NSET=CAP"
-    else:
-        yield f"*RIGID BODY, NSET=CAP, REF NODE={reference}, ROT NODE={rotation}"
-    yield "*BOUNDARY"
+        return f"*RIGID BODY, REF NODE={reference}, TIE NSET=CAP"
+    return f"*RIGID BODY, NSET=CAP, REF NODE={reference}, ROT NODE={rotation}"
+
+
+def _held(cap: RigidBody, reference: int, rotation: int | None) -> Iterator[str]:
+    """The motions that the rigid cap may not do."""
     for number, motion in enumerate(MOTIONS, start=1):
         if motion in cap.free:
             continue
@@ -211,9 +232,9 @@ def _step(increments: int) -> Iterator[str]:
     yield f"{1 / increments:.9g}, 1, 1e-6, {1 / increments:.9g}"
 
 
-def _output(own_rotation: bool) -> Iterator[str]:
-    when = f", TIME POINTS={_REPORTED}" if own_rotation else ""
-    for name in ("CAP_REFERENCE", "CAP_ROTATION") if own_rotation else ("CAP_REFERENCE",):
+def _output(reported: Iterable[str], at_time_points: bool) -> Iterator[str]:
+    when = f", TIME POINTS={_REPORTED}" if at_time_points else ""
+    for name in reported:
         yield f"*NODE PRINT, NSET={name}{when}"
         yield "U"
     yield f"*NODE FILE{when}"

@@ -8,6 +8,7 @@ does not, see docs/validation/auysakul2023.md.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from rig.mechanics.fe import (
@@ -38,8 +39,17 @@ class AxisymmetricModel:
     shape: AxisymmetricBellow
     top_centre: int
     """Node in the middle of the top's outer face."""
+    density: float
+    """Of the soft material in kg/m3."""
+    acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """No weight."""
     mirror: None = None
     """Nothing is mirrored."""
+
+    @property
+    def planes(self) -> Mapping[str, int]:
+        """The axis, and the component of displacement that it holds."""
+        return {"axis": 0}
 
     def measures(self, solution: Solution) -> dict[str, float]:
         """Displacement (rise of the top's centre) and volume; it does not bend."""
@@ -78,4 +88,4 @@ def axisymmetric_model(
         surface=PressureSurface(d, d.facets_on("cavity"), follower=follower),
     )
     (top_centre,) = d.nodes_at(r=0.0, z=shape.height)
-    return AxisymmetricModel(model, soft, shape, int(top_centre))
+    return AxisymmetricModel(model, soft, shape, int(top_centre), material.density.value)

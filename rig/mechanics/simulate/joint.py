@@ -7,6 +7,7 @@ frame and, on a disc, no stress that reaches the bellows. Flanks that touch are 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -41,8 +42,17 @@ class JointModel:
     model: Model
     soft: Solid
     shape: JointBellow
+    density: float
+    """Of the material in kg/m3."""
+    acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """No weight."""
     mirror: None = None
     """Nothing is mirrored."""
+
+    @property
+    def planes(self) -> Mapping[str, int]:
+        """The axis, and the component of displacement that it holds."""
+        return {"axis": 0}
 
     @cached_property
     def top(self) -> int:
@@ -97,7 +107,7 @@ def joint_model(
         # the volume is the same from anywhere: the cavity is closed
         surface=PressureSurface(d, d.facets_on("cavity")),
     )
-    return JointModel(model, soft, shape)
+    return JointModel(model, soft, shape, material.density.value)
 
 
 def nodes_at(discretisation: Discretisation, places: Array) -> Integers:
