@@ -131,7 +131,7 @@ class GasFilter:
         self._known = actuator
         self._filter = ExtendedKalmanFilter(dim_x=STATES, dim_z=1)
         self._filter.R = np.array([[line.pressure_noise**2]])
-        self._x = self._p = 0.0
+        self._x = self._p = self._play = 0.0
         self._expected = False
         self._bias = np.zeros(STATES)
         self._information = self._score = 0.0
@@ -142,7 +142,7 @@ class GasFilter:
         Raises ControlError if there is no room for gas.
         """
         line, known = self._line, self._known
-        self._x, self._p = plunger, pressure
+        self._x, self._p, self._play = plunger, pressure, 0.0
         space = line.line_volume - plunger + known.volume + known.compliance * pressure
         if space <= 0:
             raise ControlError(
@@ -183,8 +183,12 @@ class GasFilter:
         """The next sample, `dt` seconds after the last one: motor in m3, gauge pressure in Pa."""
         kalman = self._filter
         # the nut pushes at the motor's position and pulls one backlash later
-        plunger = min(max(self._x, plunger), plunger + self._line.backlash)
+        motor, plunger = plunger, min(max(self._x, plunger), plunger + self._line.backlash)
         transition, drive, noise = self._transition(dt, plunger, 0.5 * (self._p + pressure))
+        # a seal that sticks lets go at a pressure that nobody knows: within what is open of the
+        # play the plunger may jump
+        noise[V, V] += max(plunger - motor, self._play) ** 2
+        self._play = plunger - motor
         kalman.F, kalman.Q = transition, noise
         kalman.B = np.eye(STATES)
         kalman.predict(drive[:, None])

@@ -153,6 +153,34 @@ def test_backlash_is_no_stroke() -> None:
     assert kalman.step(DT, 5e-6 - slack, 0.0).value == pytest.approx(before, abs=0.05)
 
 
+@pytest.mark.parametrize(("jump", "alarms"), [(1.0, False), (8.0, True)])
+def test_a_plunger_that_slips_through_its_play_has_lost_no_gas(jump: float, alarms: bool) -> None:
+    """The motor has gone back by a play, the seal has stuck; once it lets go, gas pushes the plunger
+    after the motor. So large a loss would be told, had the play been closed."""
+    slack, quiet = 11e-9, replace(LINE, heat_time=1e-12, pressure_noise=1.0)
+    readings, _, _ = simulated(2, lambda _: 0.0, line=quiet)
+    monitor = GasMonitor(replace(quiet, backlash=slack), ACTUATOR, 8e-6)
+    monitor.close(*readings[0])
+    plunger, pressure = readings[-1]
+    lost = jump * slack * (AMBIENT + pressure) / 65e-6
+    after = [(plunger - slack, pressure)] * 10 + [(plunger - slack, pressure - lost)] * 20
+    for reading in readings[1:] + after:
+        monitor.step(DT, *reading)
+    assert (monitor.open() is not None) == alarms
+
+
+def test_a_closed_play_hides_nothing() -> None:
+    slack = 11e-9
+    kalman = GasFilter(replace(LINE, backlash=slack), ACTUATOR)
+    kalman.close(5e-6, 0.0)
+    sure = kalman.step(DT, 5e-6, 0.0).variance
+    pulled = kalman.step(DT, 5e-6 - slack, 0.0).variance
+    space = LINE.line_volume - 5e-6 + ACTUATOR.volume + ACTUATOR.compliance * AMBIENT
+    assert pulled == pytest.approx(sure + (slack * AMBIENT / space) ** 2, rel=0.02)
+    kalman.step(DT, 5e-6, 0.0)
+    assert kalman.step(DT, 5e-6, 0.0).variance < pulled
+
+
 def test_what_a_closing_taught_of_the_volume_is_kept() -> None:
     kalman, _ = filtered(simulated(3, lambda _: 0.0)[0])
     u = math.sqrt(kalman.covariance[V, V])
