@@ -114,6 +114,11 @@ class GasMonitor:
         return self._filter.pressure
 
     @property
+    def evidence(self) -> float:
+        """How near the tests are to deciding on a leak, which they do at 1."""
+        return max(self._leaks.evidence, self._losses.evidence)
+
+    @property
     def estimate(self) -> GasEstimate:
         """Gas, volume and leak by now."""
         return self._filter.estimate

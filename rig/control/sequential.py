@@ -90,6 +90,11 @@ class LeakTest:
         ]
         return min(sure, default=None)
 
+    @property
+    def evidence(self) -> float:
+        """The largest statistic as a share of the threshold."""
+        return max(total.ratio for total in self._sums) / self._threshold
+
 
 @dataclass
 class _Sum:
@@ -125,4 +130,11 @@ class LossTest:
         """Take the next innovation; returns whether gas has gone."""
         value = innovation.if_leaking(self._sound)
         self._recent.append(value / math.sqrt(innovation.variance))
-        return sum(self._recent) < 0 and sum(z * z for z in self._recent) > self._threshold
+        return self.evidence > 1
+
+    @property
+    def evidence(self) -> float:
+        """The sum of squares as a share of the threshold; 0 if the innovations run high."""
+        if sum(self._recent) >= 0:
+            return 0.0
+        return sum(z * z for z in self._recent) / self._threshold

@@ -155,8 +155,8 @@ def test_backlash_is_no_stroke() -> None:
 
 @pytest.mark.parametrize(("jump", "alarms"), [(1.0, False), (8.0, True)])
 def test_a_plunger_that_slips_through_its_play_has_lost_no_gas(jump: float, alarms: bool) -> None:
-    """The motor has gone back by a play, the seal has stuck; once it lets go, gas pushes the plunger
-    after the motor. So large a loss would be told, had the play been closed."""
+    """The motor has gone back by a play, the seal has stuck; once it lets go, gas pushes the
+    plunger after the motor. So large a loss would be told, had the play been closed."""
     slack, quiet = 11e-9, replace(LINE, heat_time=1e-12, pressure_noise=1.0)
     readings, _, _ = simulated(2, lambda _: 0.0, line=quiet)
     monitor = GasMonitor(replace(quiet, backlash=slack), ACTUATOR, 8e-6)
