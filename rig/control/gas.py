@@ -54,7 +54,7 @@ class GasLine:
     """s; one Prony term stands for the creep of the first minute."""
     pressure_noise: float = 2.0
     """Pa; standard deviation of one sample as the filter gets it."""
-    volume_walk: float = 3e-9
+    volume_walk: float = 2e-9
     """m3/s^0.5 by which the volume wanders: slower creep than that of `creep_time`."""
     stroke_error: float = 50e-9
     """m3 by which the volume may be off after a stroke of 1 mL, growing with its square root:
@@ -185,9 +185,9 @@ class GasFilter:
         # the nut pushes at the motor's position and pulls one backlash later
         motor, plunger = plunger, min(max(self._x, plunger), plunger + self._line.backlash)
         transition, drive, noise = self._transition(dt, plunger, 0.5 * (self._p + pressure))
-        # a seal that sticks lets go at a pressure that nobody knows: within what is open of the
-        # play the plunger may jump
-        noise[V, V] += max(plunger - motor, self._play) ** 2
+        # a seal that sticks lets go at a pressure that nobody knows: the plunger is at this end of
+        # what is open of the play or has jumped to the other
+        noise[V, V] += (0.5 * max(plunger - motor, self._play)) ** 2
         self._play = plunger - motor
         kalman.F, kalman.Q = transition, noise
         kalman.B = np.eye(STATES)

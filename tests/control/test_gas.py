@@ -176,7 +176,7 @@ def test_a_closed_play_hides_nothing() -> None:
     sure = kalman.step(DT, 5e-6, 0.0).variance
     pulled = kalman.step(DT, 5e-6 - slack, 0.0).variance
     space = LINE.line_volume - 5e-6 + ACTUATOR.volume + ACTUATOR.compliance * AMBIENT
-    assert pulled == pytest.approx(sure + (slack * AMBIENT / space) ** 2, rel=0.02)
+    assert pulled == pytest.approx(sure + (0.5 * slack * AMBIENT / space) ** 2, rel=0.02)
     kalman.step(DT, 5e-6, 0.0)
     assert kalman.step(DT, 5e-6, 0.0).variance < pulled
 
