@@ -114,6 +114,8 @@ class Touch:
 
     force: Array
     """Force on the model in N (plane strain: N/m; axisymmetric: of the full turn), (dim,)."""
+    normal_force: float
+    """Sum of the normal forces in N, whatever their directions."""
     area: float
     """Undeformed area in contact in m2; the number of points for samplings of nodes."""
     pressure: float
@@ -207,6 +209,7 @@ class Contact:
         slips = float(weights[touching & (dragged >= (1 - 1e-9) * self.friction * pushed)].sum())
         return Touch(
             force=weights @ traction,
+            normal_force=float(weights[touching] @ pushed[touching]),
             area=area,
             pressure=float(pushed.max(initial=0.0)),
             penetration=float(np.maximum(-gap, 0.0).max(initial=0.0)),
