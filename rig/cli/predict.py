@@ -29,7 +29,15 @@ class Control(StrEnum):
 
     PRESSURE = "pressure"
     ANGLE = "angle"
+    RADIUS = "radius"
     VOLUME = "volume"
+
+
+_TARGET_UNITS = {
+    Control.ANGLE: ("rad", "deg"),
+    Control.RADIUS: ("m", "mm"),
+    Control.VOLUME: ("m**3", "mL"),
+}
 
 
 @app.command()
@@ -43,14 +51,19 @@ def predict(
     ] = None,
     pressures: Annotated[
         str | None,
-        typer.Option(help="START:STOP:STEP in kPa; default: 0:10:1, up to the actuator's limit"),
+        typer.Option(
+            help="START:STOP:STEP in kPa; default: ten round steps up to the actuator's limit"
+        ),
     ] = None,
     control: Annotated[
-        Control, typer.Option(help="what is prescribed; angle and volume search `--pressures`")
+        Control, typer.Option(help="what is prescribed; all but pressure search `--pressures`")
     ] = Control.PRESSURE,
     targets: Annotated[
         str | None,
-        typer.Option(help="START:STOP:STEP of the prescribed angle in deg or volume in mL"),
+        typer.Option(
+            help="START:STOP:STEP of the prescribed angle in deg, inner bend radius in mm or "
+            "volume in mL"
+        ),
     ] = None,
     csv: Annotated[Path | None, typer.Option(help="write the table to this file, too")] = None,
     vtu: Annotated[
@@ -75,6 +88,9 @@ def predict(
     Which pressures bend it by 0 to 90 degrees:
     `rig predict --actuator SPEC --control angle --targets 0:90:10`
 
+    Which pressure, and how much volume, bend it around a tube of 60 mm:
+    `rig predict --actuator SPEC --control radius --targets 30`
+
     Stress and strain at the pressures that were solved for, up to the highest asked for, as
     files to open in ParaView and as a page to turn in a browser:
     `rig predict --actuator SPEC --model fe --vtu fields --view fields.html`
@@ -93,7 +109,7 @@ def predict(
     spec = load_actuator(actuator)
     material = Workspace.find(actuator).material(spec.material)
     grid = _pressure_grid(spec, pressures)
-    wanted = _target_grid(control, targets)
+    wanted = _wanted(spec, control, targets)
     models = _models(spec, model)
     if (vtu is not None or view is not None) and FINITE_ELEMENTS not in models:
         raise typer.BadParameter(
@@ -137,33 +153,40 @@ def _models(spec: ActuatorSpec, model: str | None) -> list[str]:
 
 
 def _pressure_grid(spec: ActuatorSpec, text: str | None) -> Array:
-    import numpy as np
-
-    from rig.spec.protocol import PressureSteps
+    from rig.mechanics.table import round_pressures
 
     if text is not None:
         return _grid(text, "Pa", "kPa", "--pressures")
-    usual = np.array(PressureSteps().values())
-    limit = spec.limits.pressure
-    return usual if usual[-1] <= limit else np.append(usual[usual < limit], limit)
+    return round_pressures(spec.limits.pressure)
 
 
-def _target_grid(control: Control, text: str | None) -> Array | None:
+def _wanted(spec: ActuatorSpec, control: Control, text: str | None) -> Array | None:
+    """Values of the response's own quantity that the targets ask for, SI; None for pressures.
+
+    An actuator that bends to an arc keeps the length of its inner side, which is the angle times
+    the inner bend radius (Yin et al., eqs. 4 and 5).
+    """
     if (control is Control.PRESSURE) != (text is None):
         raise typer.BadParameter(
-            "give --targets START:STOP:STEP together with --control angle or --control volume; "
+            "give --targets START:STOP:STEP together with --control angle, radius or volume; "
             "with --control pressure the pressures come from --pressures."
         )
     if text is None:
         return None
-    si, lab = ("rad", "deg") if control is Control.ANGLE else ("m**3", "mL")
-    return _grid(text, si, lab, "--targets")
+    targets = _grid(text, *_TARGET_UNITS[control], "--targets")
+    if control is not Control.RADIUS:
+        return targets
+    from rig.mechanics.outline import bending_shape
+
+    if not (targets > 0).all():
+        raise typer.BadParameter("--targets: an inner bend radius must be above zero.")
+    return bending_shape(spec.geometry).effective_length / targets
 
 
 def _controlled(response: Response, control: Control, values: Array) -> Response:
-    if control is Control.ANGLE:
-        return response.at(response.pressure_for("angle", values))
-    return response.at(response.pressure_for("volume", values))
+    if control is Control.VOLUME:
+        return response.at(response.pressure_for("volume", values))
+    return response.at(response.pressure_for("angle", values))
 
 
 def _grid(text: str, si: str, lab: str, option: str) -> Array:

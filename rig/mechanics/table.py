@@ -20,9 +20,18 @@ COLUMNS = (
 GRAM_FORCE = 1e-3 * STANDARD_GRAVITY
 """Newtons in a gram-force."""
 
+_ROUND = (1, 2, 3, 4, 5, 6, 8)
+"""Steps that people count in, up to a power of ten."""
 
 Row = tuple[str, *tuple[float | None, ...]]
 """Model name and its figures, in the order of `COLUMNS`."""
+
+
+def round_pressures(limit: float) -> Array:
+    """Ten equal round steps from zero to `limit` in Pa or a little below, (11,)."""
+    decade = 10 ** np.floor(np.log10(limit / 10))
+    step = max(n * decade for n in _ROUND if n * decade <= limit / 10 * (1 + 1e-9))
+    return np.asarray(step * np.arange(11.0))
 
 
 def rows(response: Response) -> list[Row]:

@@ -19,7 +19,7 @@ from rig.mechanics.errors import MechanicsError
 from rig.mechanics.model import available_models, predict
 from rig.mechanics.response import Response
 from rig.mechanics.simulate.families import FAMILIES
-from rig.mechanics.table import COLUMNS, rows
+from rig.mechanics.table import COLUMNS, round_pressures, rows
 from rig.spec.actuator import Geometry
 from rig.spec.workspace import Workspace, library_root
 
@@ -192,6 +192,13 @@ def test_predict_writes_the_contracts_csv(tmp_path, capsys):
     assert "114.633" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(
+    ("limit", "last"), [(12, 10), (40, 40), (54, 50), (200, 200), (9.5, 8), (1, 1)]
+)
+def test_default_pressures_are_ten_round_steps_up_to_the_limit(limit, last):
+    np.testing.assert_allclose(round_pressures(1e3 * limit), np.linspace(0, 1e3 * last, 11))
+
+
 def test_predict_takes_ranges_with_units(tmp_path):
     path = tmp_path / "table.csv"
     assert (
@@ -205,6 +212,8 @@ def test_predict_takes_ranges_with_units(tmp_path):
     [
         ("angle", "0:90:45", "angle_deg", [0, 45, 90]),
         ("volume", "13:15:1", "volume_ml", [13, 14, 15]),
+        # 66 mm of bellows bent by a quarter turn are an arc of 42 mm
+        ("radius", f"{66 / (np.pi / 2)!r} mm", "angle_deg", [90]),
     ],
 )
 def test_predict_inverts_for_a_controlled_quantity(tmp_path, control, targets, column, expected):
@@ -227,6 +236,7 @@ def test_predict_inverts_for_a_controlled_quantity(tmp_path, control, targets, c
         (("--pressures", "0:10:1 mm"), "pressure"),
         (("--pressures", "ten"), "START:STOP:STEP"),
         (("--control", "angle"), "--targets"),
+        (("--control", "radius", "--targets", "0"), "above zero"),
         (("--targets", "0:90:10"), "--control"),
         (("--control", "angle", "--targets", "0:150:50"), "reaches 0 to 114.6 deg"),
         (("--csv", "no-such-folder/x.csv"), "existing folder"),
