@@ -71,7 +71,7 @@ def identify(
         request = loop_request(workspace.setup(actuator, bench), seed)
         plan = IdentificationPlan(numbers(levels, "pressures in kPa"), amplitude, bits, seed=seed)
         require_within_limits(plan, request.setup)
-        length_s = expected_duration_s(plan, request.board_parameters())
+        length_s = expected_duration_s(plan, request)
         console.print(
             f"{len(plan.levels_kpa)} levels, about {length_s / 60:.1f} min of bench time.",
             soft_wrap=True,

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from rig.control.errors import ControlError
-from rig.control.identify import LevelModel
+from rig.control.identify import LevelModel, Mode
 
 FAMILY_FILE = "identification.json"
 
@@ -43,10 +44,12 @@ class PhysicsCheck(_Document):
     """The physical linearisation beside the model; gains in kPa/mL."""
 
     gas_volume_ml: float
+    """Of a liquid that of the air in it."""
     compliance_ml_kpa: float | None
     """As predicted; None if no prediction gives a volume."""
     isothermal: float
     adiabatic: float
+    """Of a liquid the isothermal one: it holds the temperature of its bubbles."""
     identified_slow: float
     """The model's static gain."""
     identified_slow_deviation: float
@@ -67,6 +70,7 @@ class IdentifiedLevel(_Document):
     times_s: tuple[float, ...]
     delay_s: float
     backlash_ml: float
+    modes: tuple[Mode, ...] = ()
     estimates: dict[str, Estimate]
     covariance: tuple[tuple[float, ...], ...]
     """Of the estimates in their order."""
@@ -91,6 +95,7 @@ class IdentifiedLevel(_Document):
             self.times_s,
             self.delay_s,
             self.backlash_ml,
+            self.modes,
         )
 
 
@@ -100,6 +105,7 @@ class Family(_Document):
     actuator: str
     bench: str
     board: str
+    fluid: Literal["gas", "liquid"] = "gas"
     seed: int
     created: str | None
     versions: dict[str, str]

@@ -100,9 +100,9 @@ def _delay(delay_s: float, tick_s: float) -> Any:
     )
 
 
-def frequencies(tick_s: float = TICK_S, count: int = 400) -> Array:
+def frequencies(tick_s: float = TICK_S, count: int = 560) -> Array:
     """Logarithmic grid in rad/s, from far below any crossover to the Nyquist frequency."""
-    return np.geomspace(0.5, math.pi / tick_s, count)
+    return np.geomspace(0.02, math.pi / tick_s, count)
 
 
 @lru_cache(maxsize=256)

@@ -25,6 +25,8 @@ class GasColumn:
     """Of all gas."""
     compliance_ml_kpa: float
     """Growth of the actuator's cavity with pressure; 0 if it is not known."""
+    exponent_quick: float = ADIABATIC_EXPONENT
+    """Of a movement too quick for heat; 1 for bubbles in a liquid, which holds their heat."""
 
     def stiffness(self, exponent: float = 1.0) -> float:
         """dp/dx in kPa/mL of gas that is compressed with this polytropic exponent."""
@@ -37,9 +39,9 @@ class GasColumn:
         return self.stiffness()
 
     @property
-    def adiabatic(self) -> float:
+    def quick(self) -> float:
         """kPa/mL of a movement too quick for heat, and slow enough for the shape to follow."""
-        return self.stiffness(ADIABATIC_EXPONENT)
+        return self.stiffness(self.exponent_quick)
 
 
 def compression_ml(

@@ -17,7 +17,7 @@ import numpy as np
 
 from rig.control.errors import ControlError
 from rig.control.family import Family, IdentifiedLevel
-from rig.control.identify import LevelModel
+from rig.control.identify import LevelModel, Mode, Shape
 from rig.control.loop import Gains, Margins, margins
 
 CRITICAL_DAMPING = 4.0
@@ -219,7 +219,11 @@ def _gain_for(model: LevelModel, bandwidth_hz: float) -> float:
 
 
 def _feed_forward(family: Family, levels: Sequence[IdentifiedLevel]) -> float:
-    """Share of Boyle's flow that the plant asks for: the growth of the cavity makes it more."""
+    """Share of Boyle's flow that the plant asks for: the growth of the cavity makes it more.
+
+    A liquid does not obey Boyle: none."""
+    if family.fluid == "liquid":
+        return 0.0
     shares = [
         (family.parameters["ambient_pressure_kpa"] + level.level_kpa)
         / level.physics.gas_volume_ml
@@ -237,23 +241,27 @@ def margins_of_draws(
     Draws that are no plant (a negative time constant) are drawn again.
     """
     rng = np.random.default_rng(seed)
-    terms = len(level.gains)
+    shape = Shape(len(level.gains), len(level.modes))
     mean = np.array([one.value for one in level.estimates.values()])
     covariance = np.array(level.covariance)
     found: list[Margins] = []
     while len(found) < draws:
         values = rng.multivariate_normal(mean, covariance, method="svd")
-        times_s, delay_s = values[3 + terms : 3 + 2 * terms], float(values[3 + 2 * terms])
-        if np.any(times_s <= 0) or delay_s < 0:
+        poles, delay_s = values[shape.linear : -2], float(values[-2])
+        if np.any(poles <= 0) or delay_s < 0:
             continue
-        drawn = LevelModel(
-            level.level_kpa,
-            level.plunger_ml,
-            float(values[2]),
-            tuple(values[3 : 3 + terms].tolist()),
-            tuple(times_s.tolist()),
-            delay_s,
-            level.backlash_ml,
+        gains_of_lags, gains_of_modes = np.split(values[3 : shape.linear], [shape.lags])
+        swings = poles[shape.lags :].reshape(shape.modes, 2)
+        drawn = replace(
+            level.model,
+            direct=float(values[2]),
+            gains=tuple(gains_of_lags.tolist()),
+            times_s=tuple(poles[: shape.lags].tolist()),
+            delay_s=delay_s,
+            modes=tuple(
+                Mode(gain, *swing)
+                for gain, swing in zip(gains_of_modes.tolist(), swings.tolist(), strict=True)
+            ),
         )
         found.append(margins(drawn.scaled(1 / member.volume), gains))
     return tuple(found)

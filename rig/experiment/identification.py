@@ -23,9 +23,16 @@ from rig.control.excitation import (
     step,
 )
 from rig.control.family import Estimate, Family, IdentifiedLevel, PhysicsCheck, RelayCheck
-from rig.control.identify import Fit, Recording, fit_percent, identify_level, predict
+from rig.control.identify import (
+    Fit,
+    LevelModel,
+    Recording,
+    fit_percent,
+    identify_level,
+    predict,
+)
 from rig.control.loop import KNOWN_DELAY_S
-from rig.control.physics import GasColumn
+from rig.control.physics import ADIABATIC_EXPONENT, GasColumn
 from rig.control.relay import FrequencyPoint, relay_point
 from rig.experiment.bench import Bench
 from rig.experiment.errors import ExperimentError, LimitError
@@ -47,6 +54,7 @@ from rig.mechanics.response import interpolated
 from rig.record.documents import StartDocument
 from rig.record.reader import RunReader
 from rig.record.writer import RunWriter
+from rig.spec.physics import Liquid
 from rig.spec.protocol import Settling
 from rig.spec.workspace import Setup
 
@@ -58,6 +66,11 @@ JOG_REPEAT_S = 0.3
 SAMPLE_S = 0.02
 STEP_REST_S = 3.0
 RAMP_SLOWNESS = 10.0
+CUSHION_S = 0.04
+"""In which a stroke may compress the air in a liquid by the amplitude: about an eighth of the swing
+of what is in the tube (a guess)."""
+BELLOW_SOFTNESS = 0.02
+"""Growth of a bellow's cavity for each kPa (a guess, as of `ActuatorVolume.of_cavity`)."""
 RELAY_HYSTERESIS = 0.25
 """Of the amplitude: the relay must not chatter on noise."""
 RELAY_S = 6.0
@@ -104,14 +117,21 @@ class Excited:
     recording: Recording
 
 
-def stroke_for(plan: IdentificationPlan, parameters: Mapping[str, float]) -> Stroke:
-    """The plunger's stroke: what compresses the whole gas volume by about the amplitude."""
-    volume_ml = (
-        plan.amplitude_kpa / parameters["ambient_pressure_kpa"] * parameters["system_volume_ml"]
-    )
-    return fastest_stroke(
-        volume_ml, parameters["max_flow_ml_s"], parameters["max_flow_acceleration_ml_s2"]
-    )
+def stroke_for(plan: IdentificationPlan, request: LoopRequest) -> Stroke:
+    """The plunger's stroke: what changes the pressure by about the amplitude.
+
+    Gas is compressed as a whole. A liquid fills the actuator, slowly: at first it compresses only
+    the air in it, and a quick stroke would raise a swing far larger than the amplitude.
+    """
+    parameters = request.board_parameters()
+    softness = parameters["system_volume_ml"] / parameters["ambient_pressure_kpa"]
+    flow, acceleration = parameters["max_flow_ml_s"], parameters["max_flow_acceleration_ml_s2"]
+    fluid = request.setup.bench.fluid
+    if isinstance(fluid, Liquid):
+        cushion = fluid.entrained_air * softness
+        flow = min(flow, plan.amplitude_kpa * cushion / CUSHION_S)
+        softness = cushion + BELLOW_SOFTNESS * request.cavity_volume * 1e6
+    return fastest_stroke(plan.amplitude_kpa * softness, flow, acceleration)
 
 
 def excitations(plan: IdentificationPlan, stroke: Stroke) -> dict[str, list[Segment]]:
@@ -123,11 +143,9 @@ def excitations(plan: IdentificationPlan, stroke: Stroke) -> dict[str, list[Segm
     }
 
 
-def expected_duration_s(plan: IdentificationPlan, parameters: Mapping[str, float]) -> float:
+def expected_duration_s(plan: IdentificationPlan, request: LoopRequest) -> float:
     """Bench time of the whole plan, roughly."""
-    shaking = sum(
-        duration_s(one) for one in excitations(plan, stroke_for(plan, parameters)).values()
-    )
+    shaking = sum(duration_s(one) for one in excitations(plan, stroke_for(plan, request)).values())
     return 20.0 + len(plan.levels_kpa) * (5.0 + plan.rest_s + shaking + RELAY_S)
 
 
@@ -166,7 +184,7 @@ def record_identification(
     Raises what goes wrong before the bench moved; later failures are in the outcome.
     """
     require_within_limits(plan, request.setup)
-    wanted = request.board_parameters()
+    stroke = stroke_for(plan, request)
 
     def work(link: RigLink, record: RunWriter, recorder: LinkRecorder) -> None:
         stage("homing the plunger and zeroing the transducer")
@@ -175,7 +193,7 @@ def record_identification(
         leave_home(link)
         for level_kpa in plan.levels_kpa:
             stage(f"identifying at {level_kpa:g} kPa")
-            _identify_level(link, record, plan, stroke_for(plan, wanted), level_kpa)
+            _identify_level(link, record, plan, stroke, level_kpa)
             recorder.flush()
         vent(link)
 
@@ -341,17 +359,19 @@ def analyse_identification(reader: RunReader) -> Analysis:
     for one in read_excitations(reader):
         by_level.setdefault(one.level_kpa, []).append(one)
     compliance = predicted_compliance(setup, tuple(by_level))
+    liquid = setup.bench.fluid if isinstance(setup.bench.fluid, Liquid) else None
     fits, relays, levels = [], [], []
     for setpoint_kpa, excited in sorted(by_level.items()):
         shaken = joined([one for one in excited if one.kind in FIT_KINDS])
-        fit = identify_level(shaken, KNOWN_DELAY_S)
+        fit = identify_level(shaken, KNOWN_DELAY_S, modes=1 if liquid else 0)
         relay = joined([one for one in excited if one.kind == "relay"])
         point = relay_point(relay, fit.model.backlash_ml)
         column = GasColumn(
             fit.model.level_kpa,
             start.parameters["ambient_pressure_kpa"],
-            start.parameters["system_volume_ml"] - fit.model.plunger_ml,
+            _gas_volume_ml(fit.model, start.parameters, liquid),
             compliance.get(setpoint_kpa, 0.0),
+            exponent_quick=1.0 if liquid else ADIABATIC_EXPONENT,
         )
         fits.append(fit)
         relays.append(relay)
@@ -362,6 +382,7 @@ def analyse_identification(reader: RunReader) -> Analysis:
         actuator=start.actuator,
         bench=start.bench,
         board=start.board,
+        fluid="liquid" if liquid else "gas",
         seed=start.seed,
         created=start.created,
         versions=start.versions,
@@ -369,6 +390,17 @@ def analyse_identification(reader: RunReader) -> Analysis:
         levels=tuple(levels),
     )
     return Analysis(family, tuple(fits), tuple(relays))
+
+
+def _gas_volume_ml(
+    model: LevelModel, parameters: Mapping[str, float], liquid: Liquid | None
+) -> float:
+    """Gas in syringe, tube and actuator at the model's pressure; of a liquid its bubbles."""
+    room_ml = parameters["system_volume_ml"]
+    if liquid is None:
+        return room_ml - model.plunger_ml
+    ambient = parameters["ambient_pressure_kpa"]
+    return liquid.entrained_air * room_ml * ambient / (ambient + model.level_kpa)
 
 
 def predicted_compliance(setup: Setup, levels_kpa: Sequence[float]) -> dict[float, float]:
@@ -425,7 +457,7 @@ def _level(
             gas_volume_ml=column.volume_ml,
             compliance_ml_kpa=column.compliance_ml_kpa if known else None,
             isothermal=column.isothermal,
-            adiabatic=column.adiabatic,
+            adiabatic=column.quick,
             identified_slow=model.static_gain,
             identified_slow_deviation=float(np.sqrt(fit.covariance[static, static].sum())),
             identified_quick=float(abs(modelled)),

@@ -114,15 +114,27 @@ def _models_table(levels: tuple[IdentifiedLevel, ...]) -> Table:
         return f"{scale * one.value:.3g} ± {scale * one.deviation:.1g}"
 
     terms = range(1, 1 + max(len(level.gains) for level in levels))
+    modes = range(1, 1 + max(len(level.modes) for level in levels))
     columns = [("level", "kPa"), ("direct gain", "kPa/mL")]
     for index in terms:
         columns += [(f"gain {index}", "kPa/mL"), (f"time {index}", "s")]
+    for index in modes:
+        columns += [
+            (f"mode gain {index}", "kPa/mL"),
+            (f"mode frequency {index}", "rad/s"),
+            (f"mode damping {index}", ""),
+        ]
     columns += [("delay", "ms"), ("backlash", "µL")]
     rows = [
         (
             f"{level.setpoint_kpa:g}",
             shown(level, "direct gain"),
             *(shown(level, f"{what} {i}") for i in terms for what in ("gain", "time constant")),
+            *(
+                shown(level, f"mode {what} {j}")
+                for j in modes
+                for what in ("gain", "frequency", "damping")
+            ),
             shown(level, "delay", 1e3),
             shown(level, "backlash", 1e3),
         )
