@@ -11,6 +11,7 @@ from rig.control.errors import ControlError
 from rig.control.identify import LevelModel, Mode
 
 FAMILY_FILE = "identification.json"
+Fluid = Literal["gas", "liquid"]
 
 
 class _Document(BaseModel):
@@ -105,7 +106,7 @@ class Family(_Document):
     actuator: str
     bench: str
     board: str
-    fluid: Literal["gas", "liquid"] = "gas"
+    fluid: Fluid = "gas"
     seed: int
     created: str | None
     versions: dict[str, str]

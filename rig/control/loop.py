@@ -135,10 +135,13 @@ def margins(model: LevelModel, gains: Gains, tick_s: float = TICK_S) -> Margins:
 
     A loop beyond its stability limit has negative margins.
     """
+    return margins_of(loop_response(model, gains, tick_s), frequencies(tick_s))
+
+
+def margins_of(response: Complex, omega: Array) -> Margins:
+    """Margins of a loop with this frequency response (n,) at `omega` in rad/s."""
     import control
 
-    response = loop_response(model, gains, tick_s)
-    omega = frequencies(tick_s)
     data = control.frd(response, omega, smooth=True)
     gain, phase, _, phase_crossover, crossover, _ = control.stability_margins(data)
     return Margins(

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.control.identify import LevelModel
+from rig.control.loop import Margins, frequencies, margins_of, plant
 
 Array = NDArray[np.float64]
 
@@ -31,8 +32,8 @@ class LinearQuadraticGaussian:
     ) -> None:
         import control
 
-        plant = control.c2d(model.state_space() * control.ss(0.0, 1.0, 1.0, 0.0), sample_s, "zoh")
-        late = plant * control.ss(0.0, 1.0, 1.0, 0.0, sample_s)
+        held = control.c2d(model.state_space() * control.ss(0.0, 1.0, 1.0, 0.0), sample_s, "zoh")
+        late = held * control.ss(0.0, 1.0, 1.0, 0.0, sample_s)
         self._a, self._b = np.asarray(late.A), np.asarray(late.B)[:, 0]
         self._c = np.asarray(late.C)[0]
         self._sample_s, self._most = sample_s, max_flow_ml_s
@@ -67,6 +68,26 @@ class LinearQuadraticGaussian:
             self._integral += self._sample_s * (measured - wanted)
         self._before = given
         return given
+
+    def margins(self, model: LevelModel) -> Margins:
+        """How far the loop around a plant, late by one sample, is from instability."""
+        import control
+
+        n = self._a.shape[0]
+        regulator, integral = self._regulator[:n], self._regulator[n]
+        # of the state that was predicted, and the integral: the filter corrects, then acts
+        corrected = np.eye(n) - np.outer(self._gain, self._c)
+        acted = np.append(regulator @ corrected, integral)
+        at_once = float(regulator @ self._gain)
+        a = np.zeros((n + 1, n + 1))
+        a[:n, :n] = self._a @ corrected
+        a[:n] -= np.outer(self._b, acted)
+        a[n, n] = 1.0
+        b = np.append(self._a @ self._gain - self._b * at_once, self._sample_s)
+        host = control.ss(a, b[:, None], acted[None, :], at_once, self._sample_s)
+        omega = frequencies(self._sample_s)
+        z = np.exp(1j * omega * self._sample_s)
+        return margins_of(np.asarray(host(z) * plant(model, self._sample_s)(z) / z), omega)
 
 
 def _regulator(a: Array, b: Array, c: Array, sample_s: float) -> Array:

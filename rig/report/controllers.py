@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from rig.control.family import Family
-from rig.experiment.controllers import Outcome
+from rig.experiment.controllers import Outcome, Standing
 from rig.report.charts import COLOURS, TALL, Chart, finished, legend_below, new_figure, styled
 from rig.report.sheet import Sheet, write_sheet
 from rig.report.sheet_parts import Section, Table
@@ -19,7 +20,30 @@ COLUMNS = (
     ("mean absolute error", "kPa"),
     ("effort", "mL/s"),
 )
+STANDING = (
+    ("controller", ""),
+    ("settling", "s"),
+    ("overshoot", "%"),
+    ("steady RMSE", "kPa"),
+    ("mean absolute error", "kPa"),
+    ("of sines", "kPa"),
+    ("effort", "mL/s"),
+    ("worst volume", "times the error"),
+    ("gain margin", "dB"),
+    ("phase margin", "deg"),
+)
 LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)))
+
+
+@dataclass(frozen=True)
+class Competition:
+    """What all controllers made of one bench."""
+
+    family: Family
+    outcomes: Sequence[Outcome]
+    standings: Sequence[Standing]
+    limits_kpa: Mapping[str, float]
+    """Mean absolute error that the motor leaves, by case."""
 
 
 def cells(outcome: Outcome) -> tuple[str, ...]:
@@ -34,40 +58,71 @@ def cells(outcome: Outcome) -> tuple[str, ...]:
     )
 
 
-def write_competition(
-    path: Path, family: Family, outcomes: Sequence[Outcome], limits: Mapping[str, float]
-) -> None:
-    """Write the page; `limits` are the mean absolute errors in kPa that the motor leaves."""
-    cases = list(dict.fromkeys(one.case for one in outcomes))
+def places(standing: Standing) -> tuple[str, ...]:
+    """A row of the table of all cases together."""
+    return (
+        standing.controller,
+        "-" if standing.settling_s is None else f"{standing.settling_s:.2f}",
+        f"{standing.overshoot_percent:.1f}",
+        f"{standing.steady_rmse_kpa:.4f}",
+        f"{standing.mae_kpa:.3f}",
+        f"{standing.sine_mae_kpa:.3f}",
+        f"{standing.effort_ml_s:.2f}",
+        f"{standing.worst_volume:.2f}",
+        f"{standing.gain_db:.1f}",
+        f"{standing.phase_deg:.0f}",
+    )
+
+
+def write_competitions(path: Path, held: Sequence[Competition]) -> None:
+    """Write the page: a table of all cases together for each bench, then every case."""
+    benches = ", ".join(one.family.bench for one in held)
+    count = sum(len({o.case for o in one.outcomes}) for one in held)
     write_sheet(
         path,
         Sheet(
-            title=f"{len(outcomes) // len(cases)} controllers in {len(cases)} cases",
-            eyebrow=f"{family.actuator} on bench {family.bench}",
+            title=f"Controllers in {count} cases",
+            eyebrow=f"{held[0].family.actuator} on {benches}",
             headline=(
                 "Settling is into 1 % of the largest set-point, the longest of a case; the mean "
                 "absolute error is of all samples, transitions included; the effort is the root "
                 "mean square of the plunger's flow. All figures are of the reported pressure.",
             ),
-            sections=tuple(_section(name, outcomes, limits) for name in cases),
+            sections=tuple(section for one in held for section in _sections(one)),
         ),
     )
 
 
-def _section(name: str, outcomes: Sequence[Outcome], limits: Mapping[str, float]) -> Section:
-    these = [one for one in outcomes if one.case == name]
+def _sections(held: Competition) -> list[Section]:
+    bench = held.family.bench
+    overview = Section(
+        f"Bench {bench}",
+        (
+            "Settling to effort are of the staircase. Robustness is told twice: how many times "
+            "larger its mean absolute error is with the worst of three volumes of gas (in a "
+            "liquid: of air) than with the identified one, and the least margins over all levels "
+            "and volumes by the identified models. The controllers know nothing of the volumes.",
+        ),
+        (Table(STANDING, [places(one) for one in held.standings]),),
+    )
+    cases = dict.fromkeys(one.case for one in held.outcomes)
+    return [*([overview] if held.standings else []), *(_section(name, held) for name in cases)]
+
+
+def _section(name: str, held: Competition) -> Section:
+    these = [one for one in held.outcomes if one.case == name]
     text = (
-        (f"No controller of this drive gets below {limits[name]:.3f} kPa on average.",)
-        if name in limits
+        (f"The fastest moves of this motor leave {held.limits_kpa[name]:.3f} kPa on average.",)
+        if name in held.limits_kpa
         else ()
     )
     return Section(
-        name,
+        f"{held.family.bench}: {name}",
         text,
         (Table(COLUMNS, [cells(one) for one in these]),),
         (
             (
-                _courses(_identifier(name), these),
+                _courses(_identifier(f"{held.family.bench} {name}"), these),
                 "Set-point (grey) and pressures.",
             ),
         ),

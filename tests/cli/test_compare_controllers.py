@@ -12,13 +12,13 @@ from tests.benches import BEAM_ACTUATOR
 from tests.cli.conftest import Command
 from tests.control.families import family_of, realistic
 
-SHORT = tuple(c for c in controllers.CASES if c.name == "0 to 8 kPa")
+SHORT = tuple(c for c in controllers.GAS_CASES if c.name == "0 to 8 kPa")
 
 
 def test_controllers_are_compared_on_one_page(
     rig: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(controllers, "CASES", SHORT)
+    monkeypatch.setattr(controllers, "GAS_CASES", SHORT)
     family = family_of(realistic(5.0))
     gains = {"proportional_ml_s_kpa": 4.0, "integral_ml_s2_kpa": 3.0, "feed_forward": 1.0}
     family = family.model_copy(update={"parameters": family.parameters | gains})
@@ -29,7 +29,7 @@ def test_controllers_are_compared_on_one_page(
         *("--bench", "virtual-beam", "--out", page, "--json"),
     )
     assert done.code == 0, done.err
-    found = json.loads(done.out)
+    (found,) = json.loads(done.out)
     assert len(found["outcomes"]) == 5 * len(SHORT)
     tuned = [o for o in found["outcomes"] if o["controller"] == "tuned PI + feed-forward"]
     assert all(o["steady_rmse_kpa"] < 0.02 for o in tuned)
@@ -38,6 +38,6 @@ def test_controllers_are_compared_on_one_page(
 
 def test_a_real_bench_is_refused(rig: Command, tmp_path: Path) -> None:
     (tmp_path / "identification.json").write_text(family_of(realistic(5.0)).model_dump_json())
-    done = rig("compare-controllers", tmp_path, "--bench", "mega")
+    done = rig("compare-controllers", tmp_path, "--actuator", BEAM_ACTUATOR, "--bench", "mega")
     assert done.code == 1
     assert "Nothing was moved" in " ".join(done.err.split())

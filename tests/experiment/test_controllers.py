@@ -2,28 +2,38 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rig.board.virtual import VirtualBench
+from rig.control.identify import LevelModel
 from rig.control.loop import Gains
 from rig.control.lqg import LinearQuadraticGaussian
 from rig.control.tune import Wanted, tune
 from rig.experiment.controllers import (
-    CASES,
-    HOLD_S,
-    Case,
+    GAS_CASES,
+    LIQUID_CASES,
+    VOLUMES,
     Controller,
     Outcome,
+    StatedMargins,
     compete,
     contenders,
     motor_limited_mae_kpa,
+    setup_of,
+    staircase,
+    standings,
 )
-from tests.control.families import NOISE_KPA, family_of, realistic
+from rig.spec.physics import Liquid
+from rig.spec.workspace import Workspace
+from tests.benches import BEAM_ACTUATOR, ROOT
+from tests.control.families import NOISE_KPA, family_of, integrator, realistic
 from tests.experiment.test_identification import SEED, loop_request
 
 LEVELS = (4.0, 6.0)
-CASE = Case("stairs", lambda t: LEVELS[min(int(t / HOLD_S), 1)], 2 * HOLD_S, LEVELS)
+CASE = staircase("stairs", LEVELS, 5.0)
 
 
 @pytest.fixture(scope="module")
@@ -72,15 +82,77 @@ def test_the_tuned_controller_beats_the_shipped_one(controllers: dict[str, Contr
 
 
 def test_what_the_motor_leaves_is_half_of_each_move() -> None:
-    known = {"max_flow_ml_s": 8.0, "max_flow_acceleration_ml_s2": 40.0}
-    case = Case("one", lambda t: 8.0, HOLD_S, (8.0,))
+    case = staircase("one", (8.0,), 5.0)
     move_s = 8.0 / 8.0 + 8.0 / 40.0
-    assert motor_limited_mae_kpa(case, 1.0, known) == pytest.approx(8.0 * move_s / 2 / HOLD_S)
+    limit = motor_limited_mae_kpa(case, family_of(integrator(1.0, 0.006)))
+    assert limit == pytest.approx(8.0 * move_s / 2 / 5.0, rel=1e-4)
+
+
+def test_a_plant_that_gives_way_later_leaves_less_of_a_move() -> None:
+    """Until the gas has cooled it takes less of the plunger to get there."""
+    case = staircase("one", (8.0,), 5.0)
+    warm = LevelModel(4.0, 4.0, 1.4, (-0.4,), (0.35,), 0.006, 0.0)
+    limits = [motor_limited_mae_kpa(case, family_of(one)) for one in (warm, integrator(1.0, 0.0))]
+    assert 0.7 * limits[1] < limits[0] < 0.98 * limits[1]
 
 
 def test_only_with_the_identified_volume_does_the_model_tell_what_the_motor_leaves() -> None:
-    other = {case.name for case in CASES if not case.is_as_identified}
-    assert other == {"0 to 8 kPa, plunger in", "staircase, +15 mL", "staircase, +30 mL"}
+    volumes = {"staircase, volume -30 %", "staircase, volume +30 %"}
+    other = {case.name for case in GAS_CASES if not case.is_as_identified}
+    assert other == volumes | {"0 to 8 kPa, plunger in"}
+    assert {case.name for case in LIQUID_CASES if not case.is_as_identified} == volumes
+
+
+def test_a_case_changes_the_gas_on_the_bench_and_nothing_else() -> None:
+    gas = loop_request().setup
+    more, same, less = (
+        setup_of(gas, staircase("", (1.0,), 1.0, volume=v), 80.0) for v in (1.3, 1.0, 0.7)
+    )
+    added = more.bench.syringe.dead_volume - gas.bench.syringe.dead_volume
+    assert added == pytest.approx(24e-6)
+    assert same.bench == less.bench == gas.bench, "less gas is the plunger further in"
+    water = Workspace(ROOT).setup(BEAM_ACTUATOR, "virtual-water")
+    airier = setup_of(water, staircase("", (1.0,), 1.0, volume=1.3), 80.0).bench
+    assert isinstance(airier.fluid, Liquid)
+    assert isinstance(water.bench.fluid, Liquid)
+    assert airier.fluid.entrained_air == pytest.approx(1.3 * water.bench.fluid.entrained_air)
+
+
+def test_robustness_is_the_worst_of_the_volumes() -> None:
+    def outcome(case: str, mae: float) -> Outcome:
+        nothing = np.zeros(0)
+        return Outcome("PI", case, nothing, nothing, nothing, 0.5, 1.0, 0.005, mae, 1.0)
+
+    controller = Controller("PI", "board", {}, StatedMargins(8.0, 70.0))
+    names = [case.name for case in GAS_CASES if case.name.startswith("staircase")]
+    assert len(names) == len(VOLUMES)
+    runs = [outcome(name, 0.1 + 0.05 * ("+30" in name)) for name in names]
+    assert standings([controller], runs) == [], "the sines are missing"
+    (standing,) = standings([controller], [*runs, outcome("sines", 0.2)])
+    assert standing.worst_volume == pytest.approx(1.5)
+    assert (standing.mae_kpa, standing.sine_mae_kpa) == (0.1, 0.2)
+    assert (standing.gain_db, standing.phase_deg) == (8.0, 70.0)
+
+
+@pytest.mark.parametrize(("share", "quiet"), [(0.9, True), (1.1, False)])
+def test_the_margins_of_the_regulator_in_the_host_are_those_of_its_loop(
+    share: float, quiet: bool
+) -> None:
+    import control
+
+    model, sample_s = realistic(5.0), 0.02
+    regulator = LinearQuadraticGaussian(model, NOISE_KPA, sample_s, 1e6)
+    plant = control.c2d(model.state_space() * control.ss(0.0, 1.0, 1.0, 0.0), sample_s, "zoh")
+    late = replace(model, delay_s=0.002)  # whole samples only, as the simulation has them
+    gain = share * regulator.margins(late).gain
+    state, pressure, flow, course = np.zeros(plant.A.shape[0]), 0.1, 0.0, []
+    regulator.flow(0.0, 0.0, 0.0)
+    for _ in range(1500):
+        given = regulator.flow(pressure, 0.0, 0.0)
+        state = plant.A @ state + gain * plant.B[:, 0] * flow
+        pressure, flow = float((plant.C @ state)[0]) + 0.1 * (not course), given
+        course.append(pressure)
+    assert (np.ptp(course[-100:]) < np.ptp(course[100:200])) == quiet
 
 
 def test_the_regulator_in_the_host_rejects_a_lasting_disturbance() -> None:
