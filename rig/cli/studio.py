@@ -19,6 +19,9 @@ def studio(
         str | None,
         typer.Option(envvar="RIG_STUDIO_TOKEN", help="Secret that browsers must bring."),
     ] = None,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", help="Write tracebacks of what fails in the server.")
+    ] = False,
 ) -> None:
     """Open the studio of the workspace around the current directory; stop it with Ctrl-C.
 
@@ -45,7 +48,7 @@ def studio(
     workspace = Workspace.find()
     place = "the library that ships with rig" if workspace.is_library else str(workspace.root)
     typer.echo(f"studio of {place}: http://{_shown(host)}:{port}/ (Ctrl-C ends it)")
-    serve(Studio(workspace), access)
+    serve(Studio(workspace), access, verbose=verbose)
 
 
 def _shown(host: str) -> str:

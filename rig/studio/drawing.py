@@ -17,6 +17,8 @@ Box = tuple[float, float, float, float]
 
 MARGIN_MM = 4.0
 SCALE_MM = 10
+BAR_MM = 4.0
+"""Room for the scale beneath what is drawn."""
 
 
 def box_of(shapes: Sequence[Array]) -> Box:
@@ -25,7 +27,7 @@ def box_of(shapes: Sequence[Array]) -> Box:
     (left, bottom), (right, top) = points.min(axis=0), points.max(axis=0)
     return (
         float(left) - MARGIN_MM,
-        float(bottom) - MARGIN_MM,
+        float(bottom) - MARGIN_MM - BAR_MM,
         float(right) + MARGIN_MM,
         float(top) + MARGIN_MM,
     )

@@ -9,6 +9,7 @@ from starlette.types import ASGIApp
 from rig.studio.access import Access
 from rig.studio.gate import MAX_BODY, Gate
 from rig.studio.live import live_route
+from rig.studio.log import configure
 from rig.studio.pages import bench, design, runs
 from rig.studio.routes import routes
 from rig.studio.state import Studio
@@ -38,16 +39,21 @@ def application(studio: Studio, access: Access) -> ASGIApp:
     return Gate(app, access)
 
 
-def serve(studio: Studio, access: Access) -> None:
-    """Serve until somebody presses Ctrl-C; leaves nothing running."""
+def serve(studio: Studio, access: Access, *, verbose: bool) -> None:
+    """Serve until somebody presses Ctrl-C; leaves nothing running.
+
+    `verbose` writes tracebacks of what fails in a library.
+    """
     import uvicorn
 
+    configure(verbose=verbose)
     try:
         uvicorn.run(
             application(studio, access),
             host=access.host,
             port=access.port,
-            log_level="warning",
+            log_config=None,
+            access_log=False,
             server_header=False,
             timeout_graceful_shutdown=GRACE_S,
             ws_max_size=MAX_BODY,

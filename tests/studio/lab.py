@@ -5,8 +5,15 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+from rig.board.virtual import VirtualBench
+from rig.experiment.bench import Nobody
+from rig.experiment.request import make_request
+from rig.experiment.run import new_run
+from rig.report.build import build_report
 from rig.spec.workspace import Workspace, library_root
 
+PATIENT_S = 90.0
+"""Against a test that hangs; nothing is asserted of it."""
 SPECS = Path(__file__).parents[1] / "specs"
 TINY = (
     "kind: protocol\nname: tiny\ndescription: two points\n"
@@ -32,3 +39,13 @@ def make_lab(root: Path) -> Workspace:
     )
     (root / "logs").mkdir()
     return Workspace(root)
+
+
+def record_run(workspace: Workspace, folder: Path, seed: int = 1) -> None:
+    """Take a short run of both experiments, as `rig characterise` takes it, with its report."""
+    setup = workspace.setup("bellow-bending", "virtual-beam", "tiny-both")
+    bench = VirtualBench(setup, seed, None)
+    outcome = new_run(folder, bench, make_request(setup, seed), Nobody())
+    bench.close()
+    assert outcome.stop.exit_status == "success"
+    build_report(folder)

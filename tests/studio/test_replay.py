@@ -10,32 +10,21 @@ import pytest
 from fastapi import FastAPI
 from starlette.testclient import TestClient
 
-from rig.board.virtual import VirtualBench
-from rig.experiment.bench import Nobody
-from rig.experiment.request import make_request
-from rig.experiment.run import new_run
 from rig.record.reader import RunReader
-from rig.report.build import build_report
 from rig.spec.workspace import Workspace
 from rig.studio.errors import StudioError
 from rig.studio.replay import MOST_REPLAYS, Replay, Replays, Series
 from rig.studio.routes import routes
 from rig.studio.runs import levels_of, short_names, summary_of
 from rig.studio.state import Studio
-from tests.studio.lab import make_lab
+from tests.studio.lab import make_lab, record_run
 
 
 @pytest.fixture(scope="module")
 def lab(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     """A workspace with one short run in it, as `rig characterise` takes it."""
     workspace = make_lab(tmp_path_factory.mktemp("lab"))
-    setup = workspace.setup("bellow-bending", "virtual-beam", "tiny-both")
-    folder = workspace.logs / "run-1"
-    bench = VirtualBench(setup, 1, None)
-    outcome = new_run(folder, bench, make_request(setup, 1), Nobody())
-    bench.close()
-    assert outcome.stop.exit_status == "success"
-    build_report(folder)
+    record_run(workspace, workspace.logs / "run-1")
     return workspace
 
 

@@ -9,7 +9,7 @@ from nicegui import ui
 
 from rig.errors import RigError
 from rig.studio.desk import JOG_ML_S, Choice, Opcode
-from rig.studio.pages.frame import BENCH, frame, heading, say
+from rig.studio.pages.frame import BENCH, frame, heading, number_of, say, text_of
 from rig.studio.state import Studio
 
 ORDERS: tuple[tuple[str, Opcode, float], ...] = (
@@ -159,15 +159,15 @@ class BenchPage:
         self._desk.connect(
             session,
             Choice(
-                actuator=self._actuator.value or "",
-                bench=self._bench.value or "",
-                seed=int(self._seed.value or 0),
-                speed=float(self._speed.value if self._speed.value is not None else 1.0),
+                actuator=text_of(self._actuator.value),
+                bench=text_of(self._bench.value),
+                seed=int(number_of(self._seed.value, 0.0)),
+                speed=number_of(self._speed.value, 1.0),
             ),
         )
 
     def _go(self, session: str) -> None:
-        self._desk.order(session, "set_pressure", float(self._target.value or 0.0))
+        self._desk.order(session, "set_pressure", number_of(self._target.value, 0.0))
 
     def _run(self, session: str) -> None:
-        self._desk.take(session, self._protocols.value or "")
+        self._desk.take(session, text_of(self._protocols.value))

@@ -11,6 +11,7 @@ from nicegui import events, ui
 
 from rig.errors import RigError
 from rig.mechanics.model import available_models
+from rig.studio.beside import Design, compared
 from rig.studio.charts import response_options
 from rig.studio.curves import Beam, Curve
 from rig.studio.design import (
@@ -26,7 +27,7 @@ from rig.studio.design import (
 )
 from rig.studio.drawing import profile_svg, section_svg
 from rig.studio.errors import StudioError
-from rig.studio.pages.frame import frame, heading, say, telling
+from rig.studio.pages.frame import frame, heading, number_of, say, telling, text_of
 from rig.studio.pages.work import Progress
 from rig.studio.section import section_of
 from rig.studio.state import Studio
@@ -56,8 +57,10 @@ class DesignPage:
         self._checked: Checked | None = None
         self._beam: Beam | None = None
         self._curve: Curve | None = None
-        self._pinned: Curve | None = None
+        self._pinned: Design | None = None
         self._fields: Curve | None = None
+        self._computed_of: Checked | None = None
+        """The design that finite elements were asked for last."""
         self._inputs: dict[str, ui.input] = {}
         with ui.element("div").classes("two"):
             with ui.column().classes("panel"):
@@ -129,12 +132,13 @@ class DesignPage:
                 self._angle = ui.echart({}, renderer="svg").classes("chart")
                 self._force = ui.echart({}, renderer="svg").classes("chart")
             with ui.row().classes("actions"):
-                ui.button("Pin for comparison", on_click=self._pin, color=None).classes(
+                ui.button("Pin for comparison", on_click=telling(self._pin), color=None).classes(
                     "plain"
                 ).props("unelevated")
                 ui.button("Unpin", on_click=self._unpin, color=None).classes("plain").props(
                     "unelevated"
                 )
+            self._beside = ui.html("", sanitize=False).classes("scrolls")
 
     def _finite_elements(self) -> None:
         with ui.column().classes("panel"):
@@ -147,6 +151,11 @@ class DesignPage:
                 "unelevated"
             )
             self._computing = Progress(self._studio.workshop)
+            self._stale = ui.html(
+                '<p class="caution">The design has changed since: this is of the one before.</p>',
+                sanitize=False,
+            )
+            self._stale.set_visibility(False)
             self._margin = ui.html("", sanitize=False)
             self._view = (
                 ui.element("iframe")
@@ -167,28 +176,29 @@ class DesignPage:
 
     def _open(self, event: events.ValueChangeEventArguments[Any]) -> None:
         try:
-            self._draft = open_draft(self._studio.workspace, event.value)
+            self._draft = open_draft(self._studio.workspace, text_of(event.value))
         except RigError as error:
             say(str(error), "negative")
             return
         self._show_form()
 
     def _renamed(self, event: events.ValueChangeEventArguments[Any]) -> None:
-        self._change(replace(self._draft, name=event.value or ""))
+        self._change(replace(self._draft, name=text_of(event.value)))
 
     def _described(self, event: events.ValueChangeEventArguments[Any]) -> None:
-        self._change(replace(self._draft, description=event.value or ""))
+        self._change(replace(self._draft, description=text_of(event.value)))
 
     def _new_material(self, event: events.ValueChangeEventArguments[Any]) -> None:
-        self._change(replace(self._draft, material=event.value or ""))
+        self._change(replace(self._draft, material=text_of(event.value)))
 
     def _new_family(self, event: events.ValueChangeEventArguments[Any]) -> None:
-        if event.value in FAMILIES and event.value != self._draft.family:
-            self._draft = self._draft.in_family(event.value)
+        family = text_of(event.value)
+        if family in FAMILIES and family != self._draft.family:
+            self._draft = self._draft.in_family(family)
             self._show_form()
 
     def _typed(self, name: str, event: events.ValueChangeEventArguments[Any]) -> None:
-        self._change(self._draft.with_value(name, event.value or ""))
+        self._change(self._draft.with_value(name, text_of(event.value)))
 
     def _change(self, draft: Draft) -> None:
         if draft != self._draft:
@@ -213,7 +223,6 @@ class DesignPage:
         self._family.value = draft.family
         materials = self._studio.workspace.names("material")
         self._material.value = draft.material if draft.material in materials else None
-        self._fields = None
         self._refresh()
 
     def _refresh(self) -> None:
@@ -243,6 +252,7 @@ class DesignPage:
             self._beam = self._curve = None
             say(str(error), "negative")
         self._bend()
+        self._compare()
 
     def _bend(self) -> None:
         """Draw the actuator at the slider's pressure."""
@@ -252,13 +262,15 @@ class DesignPage:
             self._figures.text = "Beam theory is for the bending bellow; compute finite elements."
             self._draw_curves(None)
             return
-        bent = beam.bent(beam.top_pressure * float(self._slider.value) / SLIDER_STEPS)
+        bent = beam.bent(beam.top_pressure * number_of(self._slider.value, 0.0) / SLIDER_STEPS)
         self._bent.content = profile_svg(bent.profile, beam.window(), bent.words)
         self._figures.text = bent.words
         self._draw_curves(bent.pressure_kpa)
 
     def _draw_curves(self, at_kpa: float | None) -> None:
-        curves = [c for c in (self._curve, self._pinned, self._fields) if c is not None]
+        pinned = None if self._pinned is None else self._pinned.curve
+        fields = self._fields if self._fields_hold else None
+        curves = [c for c in (self._curve, pinned, fields) if c is not None]
         has_angle = any(c.angle_deg is not None for c in curves)
         first = [c.angle_deg if has_angle else c.displacement_mm for c in curves]
         name = "bending angle (deg)" if has_angle else "elongation (mm)"
@@ -272,19 +284,56 @@ class DesignPage:
             chart.options.clear()
             chart.options.update(options)
             chart.update()
+        self._stale.set_visibility(self._fields is not None and fields is None)
+
+    @property
+    def _fields_hold(self) -> bool:
+        """Whether what finite elements said is of the design as it is now."""
+        of, now = self._computed_of, self._checked
+        if of is None or now is None or of.spec is None or now.spec is None:
+            return False
+        return of.spec.geometry == now.spec.geometry and of.material == now.material
+
+    def _design(self) -> Design | None:
+        """What is there to be compared: beam theory, or finite elements where there is none."""
+        curve = self._curve or (self._fields if self._fields_hold else None)
+        if curve is None:
+            return None
+        return Design(self._draft, curve, None if self._beam is None else self._beam.mass_g)
 
     def _pin(self) -> None:
-        if self._curve is not None:
-            self._pinned = replace(self._curve, label=f"{self._curve.label}, pinned")
-            self._bend()
+        design = self._design()
+        if design is None:
+            raise StudioError("there is no curve to pin yet: compute finite elements first.")
+        label = f"{design.curve.label}, pinned"
+        self._pinned = replace(design, curve=replace(design.curve, label=label))
+        self._bend()
+        self._compare()
 
     def _unpin(self) -> None:
         self._pinned = None
         self._bend()
+        self._compare()
+
+    def _compare(self) -> None:
+        """Lay the pinned design beside the one that is edited."""
+        now = self._design()
+        if self._pinned is None or now is None:
+            self._beside.content = ""
+            return
+        lines = "".join(
+            f'<tr><th scope="row">{html.escape(row.what)}</th><td>{html.escape(row.pinned)}</td>'
+            f"<td>{html.escape(row.now)}</td></tr>"
+            for row in compared(self._pinned, now)
+        )
+        self._beside.content = (
+            '<table class="plain"><thead><tr><th scope="col"></th><th scope="col">pinned</th>'
+            f'<th scope="col">now</th></tr></thead><tbody>{lines}</tbody></table>'
+        )
 
     def _save(self) -> None:
         assert self._checked is not None
-        path = save(self._checked, self._studio.workspace, replacing=self._replace.value)
+        path = save(self._checked, self._studio.workspace, replacing=self._replace.value is True)
         say(f"saved as {path}", "positive")
 
     def _sound(self) -> Checked:
@@ -306,17 +355,18 @@ class DesignPage:
         if FINITE_ELEMENTS not in available_models(checked.spec.geometry.family):
             raise StudioError("this family has no finite element model.")
         self._computing.start(
-            self._computed,
+            partial(self._computed, checked),
             finite_elements,
             checked.spec,
             checked.material,
             checked.spec.limits.pressure,
         )
 
-    def _computed(self, answer: FieldsAnswer) -> None:
-        self._fields = answer.curve
+    def _computed(self, of: Checked, answer: FieldsAnswer) -> None:
+        self._fields, self._computed_of = answer.curve, of
         cautions = "".join(f'<p class="caution">{html.escape(c)}</p>' for c in answer.cautions)
         self._margin.content = f"<p>{html.escape(answer.margin)}</p>{cautions}"
         self._view.props(f'src="{self._studio.views.keep(answer.page)}"')
         self._view.set_visibility(True)
         self._bend()
+        self._compare()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Literal
@@ -67,6 +68,18 @@ def say(text: str, kind: Kind = "info") -> None:
         close_button="close",
         timeout=0 if kind == "negative" else 5000,
     )
+
+
+def text_of(value: object) -> str:
+    """What a text field holds; anything but text, which no page of ours sends, is none."""
+    return value if isinstance(value, str) else ""
+
+
+def number_of(value: object, otherwise: float) -> float:
+    """What a number field or a slider holds; `otherwise` where that is no finite number."""
+    if isinstance(value, (int, float)) and math.isfinite(value):
+        return float(value)
+    return otherwise
 
 
 def heading(text: str) -> None:

@@ -14,7 +14,7 @@ from nicegui import ui
 from rig.record.documents import ExperimentName
 from rig.report.summary import RunSummary
 from rig.studio.charts import Options, Trace, moved, traces_options
-from rig.studio.pages.frame import heading
+from rig.studio.pages.frame import heading, number_of
 from rig.studio.replay import Replay
 from rig.studio.runs import levels_of, short_names
 
@@ -122,7 +122,7 @@ class ReplayPanel:
 
     def _show(self) -> None:
         """Everything at the slider's time."""
-        time_s = float(self._slider.value)
+        time_s = number_of(self._slider.value, 0.0)
         for one, picture, caption in zip(self._played, self._pictures, self._captions, strict=True):
             moment = one.replay.at(time_s)
             caption.text = moment.words
@@ -137,17 +137,18 @@ class ReplayPanel:
     def _play_or_pause(self) -> None:
         self._timer.active = not self._timer.active
         self._play.text = "Pause" if self._timer.active else "Play"
-        if self._timer.active and self._slider.value >= self._slider.props["max"]:
+        if self._timer.active and number_of(self._slider.value, 0.0) >= self._slider.props["max"]:
             self._slider.value = 0
 
     def _tick(self) -> None:
         end_s = float(self._slider.props["max"])
-        self._slider.value = min(end_s, self._slider.value + PLAY_S * float(self._speed.value))
+        step_s = PLAY_S * number_of(self._speed.value, 1.0)
+        self._slider.value = min(end_s, number_of(self._slider.value, 0.0) + step_s)
         if self._slider.value >= end_s:
             self._play_or_pause()
 
     def _go_beside(self, step: int) -> None:
-        self._slider.value = self._played[0].replay.beside(float(self._slider.value), step)
+        self._slider.value = self._played[0].replay.beside(number_of(self._slider.value, 0.0), step)
 
 
 def _chart(options: Options) -> Any:

@@ -12,7 +12,7 @@ from nicegui import ui
 from rig.errors import RigError
 from rig.studio.errors import StudioError
 from rig.studio.files import inside
-from rig.studio.pages.frame import frame, say, telling
+from rig.studio.pages.frame import frame, say, telling, text_of
 from rig.studio.pages.replay import Played, ReplayPanel
 from rig.studio.pages.work import Progress
 from rig.studio.replay import MOST_REPLAYS
@@ -87,7 +87,7 @@ class RunsPage:
         self._show()
 
     def _show(self) -> None:
-        rows = matching(self._rows, self._filter.value or "")
+        rows = matching(self._rows, text_of(self._filter.value))
         self._table.rows = [{name: getattr(row, name) for name in COLUMNS} for row in rows]
         self._nothing.set_visibility(not self._rows)
 
@@ -105,7 +105,7 @@ class RunsPage:
                     ).props("download")
 
     def _selected(self) -> list[RunRow]:
-        names = [str(row["name"]) for row in self._table.selected]
+        names = [text_of(row.get("name")) for row in self._table.selected]
         return [row for row in self._rows if row.name in names]
 
     def _one(self) -> RunRow:
