@@ -27,7 +27,7 @@ class BellowBendingGeometry(SpecModel):
     Radii are those of the inner surface (the cavity); the wall lies outside.
     """
 
-    family: Literal["bellow-bending"]
+    family: Literal["bellow-bending"] = Field(description="which geometry this is")
     effective_length: Length = Field(0.066, gt=0, description="L, length of all convolutions")
     bellow_number: Count = Field(6, le=1000, description="N, convolutions from trough to trough")
     average_radius: Length = Field(0.006, gt=0, description="rm = (ri + ro) / 2")
@@ -74,7 +74,7 @@ class BellowAxisymmetricGeometry(SpecModel):
     inner contour is the outer one moved inwards by t, measured along the radius.
     """
 
-    family: Literal["bellow-axisymmetric"]
+    family: Literal["bellow-axisymmetric"] = Field(description="which geometry this is")
     wall_thickness: Length = Field(0.003, gt=0, description="A: t, along the radius")
     bellow_number: Count = Field(6, le=1000, description="B: N, layers of bellows")
     divided_ratio: Ratio = Field(
@@ -132,7 +132,7 @@ class BellowJointGeometry(SpecModel):
     alone, its figure 2 the rest: all other values here are ours, see docs/validation/guo2020.md.
     """
 
-    family: Literal["bellow-joint"]
+    family: Literal["bellow-joint"] = Field(description="which geometry this is")
     bellow_number: Count = Field(14, le=1000, description="V-shaped bellows, trough to trough")
     pitch: Length = Field(0.003, gt=0, description="height of one bellow")
     trough_radius: Length = Field(0.003, gt=0, description="smallest radius of the wall's middle")
@@ -180,7 +180,7 @@ class BellowGripperGeometry(SpecModel):
     The paper states neither the distance of bellows and object nor any friction: both are ours.
     """
 
-    family: Literal["bellow-gripper"]
+    family: Literal["bellow-gripper"] = Field(description="which geometry this is")
     finger: BellowAxisymmetricGeometry = Field(description="either bellow")
     held: Literal["cube", "cylinder", "sphere"] = Field(
         "cube", description="the object; a cylinder stands upright: it is pulled along its axis"
@@ -236,20 +236,26 @@ class PartTolerances(SpecModel):
     They tell an error of a model from one of its inputs.
     """
 
-    young_modulus: Ratio = Field(ge=0)
-    wall_thickness: Ratio = Field(ge=0)
+    young_modulus: Ratio = Field(
+        ge=0, description="relative standard deviation of Young's modulus between parts"
+    )
+    wall_thickness: Ratio = Field(
+        ge=0, description="relative standard deviation of the wall thickness between parts"
+    )
 
 
 class ActuatorSpec(SpecModel):
     """One actuator: what it is, what it is made of, how far it may go, what to predict."""
 
-    kind: Literal["actuator"]
+    kind: Literal["actuator"] = Field(description="tells that this is a file of this kind")
     name: Name
-    description: str = ""
-    geometry: Geometry
+    description: str = Field("", description="one line for people: what it is and what it is for")
+    geometry: Geometry = Field(description="family and dimensions")
     material: str = Field(description="name of a file in models/materials, or a path")
-    limits: ActuatorLimits
+    limits: ActuatorLimits = Field(description="what the actuator bears")
     tolerances: PartTolerances | None = Field(
         None, description="how well the printed part is known; without it, as drawn"
     )
-    predictions: tuple[ModelName, ...] = ("beam",)
+    predictions: tuple[ModelName, ...] = Field(
+        ("beam",), description="models that a run is compared with"
+    )

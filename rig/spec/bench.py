@@ -34,31 +34,31 @@ from rig.spec.quantity import (
 class VirtualBoard(SpecModel):
     """The firmware compiled for this machine, on the simulated bench."""
 
-    kind: Literal["virtual"]
+    kind: Literal["virtual"] = Field(description="which board this is")
 
 
 class EmulatedBoard(SpecModel):
     """The image of the Mega, emulated, on the simulated bench; needs some Debian packages."""
 
-    kind: Literal["emulated"]
+    kind: Literal["emulated"] = Field(description="which board this is")
 
 
 class SerialBoard(SpecModel):
     """An Arduino Mega on a serial port, any pyserial URL, or behind a CAN adapter."""
 
-    kind: Literal["serial"]
+    kind: Literal["serial"] = Field(description="which board this is")
     port: str = Field(
         min_length=1,
         description="auto, or as /dev/ttyACM0, COM3, socket://host:port, can:socketcan:can0",
     )
-    baudrate: Count = Field(115200, le=20_000_000)
+    baudrate: Count = Field(115200, le=20_000_000, description="bits per second of the serial line")
 
 
 class Syringe(SpecModel):
     """The syringe whose plunger sets the pressure."""
 
-    volume: Volume = Field(gt=0)
-    inner_diameter: Length = Field(gt=0)
+    volume: Volume = Field(gt=0, description="swept from stop to stop")
+    inner_diameter: Length = Field(gt=0, description="of the barrel")
     dead_volume: Volume = Field(ge=0, description="left when the plunger is fully in")
     calibration: str | None = Field(
         None, description="file in calibration/, or a path; replaces what the drawing says"
@@ -73,23 +73,27 @@ class Syringe(SpecModel):
 class Stepper(SpecModel):
     """The motor that turns the lead screw, and how finely it is driven."""
 
-    steps_per_revolution: Count = Field(le=100_000)
-    microsteps: Count = Field(le=1024)
-    max_step_rate: Frequency = Field(gt=0)
+    steps_per_revolution: Count = Field(
+        le=100_000, description="full steps of the motor for one turn"
+    )
+    microsteps: Count = Field(le=1024, description="steps that the driver makes of a full one")
+    max_step_rate: Frequency = Field(
+        gt=0, description="microsteps per second that the motor follows under load"
+    )
 
 
 class LeadScrew(SpecModel):
     """What turns revolutions of the motor into travel of the plunger."""
 
     lead: Length = Field(gt=0, description="travel per revolution")
-    backlash: Length = Field(ge=0)
+    backlash: Length = Field(ge=0, description="play of the nut when the direction turns")
 
 
 class Tubing(SpecModel):
     """The tube between syringe and actuator."""
 
-    inner_diameter: Length = Field(gt=0)
-    length: Length = Field(gt=0)
+    inner_diameter: Length = Field(gt=0, description="of the tube")
+    length: Length = Field(gt=0, description="from syringe to actuator")
 
     @property
     def volume(self) -> float:
@@ -100,11 +104,11 @@ class Tubing(SpecModel):
 class Transducer(SpecModel):
     """The pressure sensor as its data sheet describes it."""
 
-    model: str
-    pressure_low: Pressure
-    pressure_high: Pressure
-    voltage_low: Voltage
-    voltage_high: Voltage
+    model: str = Field(description="maker's name of the sensor")
+    pressure_low: Pressure = Field(description="gauge pressure at `voltage_low`")
+    pressure_high: Pressure = Field(description="gauge pressure at `voltage_high`")
+    voltage_low: Voltage = Field(description="output at `pressure_low`")
+    voltage_high: Voltage = Field(description="output at `pressure_high`")
     calibration: str = Field(description="file in calibration/, or a path")
 
     @model_validator(mode="after")
@@ -119,29 +123,29 @@ class Transducer(SpecModel):
 class Adc(SpecModel):
     """The converter that reads the transducer."""
 
-    bits: Count = Field(ge=8, le=16)
-    reference: Voltage = Field(gt=0)
+    bits: Count = Field(ge=8, le=16, description="of the board's converter")
+    reference: Voltage = Field(gt=0, description="voltage of a full count")
 
 
 class LoadCell(SpecModel):
     """The load cell with its amplifier (HX711)."""
 
-    model: str
-    capacity: Mass = Field(gt=0)
-    sample_rate: Frequency = Field(gt=0)
+    model: str = Field(description="maker's name of the cell")
+    capacity: Mass = Field(gt=0, description="load that it may bear")
+    sample_rate: Frequency = Field(gt=0, description="conversions per second of the HX711")
     calibration: str = Field(description="file in calibration/, or a path")
 
 
 class VirtualCameraDevice(SpecModel):
     """The rendered camera of the virtual bench."""
 
-    kind: Literal["virtual"]
+    kind: Literal["virtual"] = Field(description="which camera this is")
 
 
 class OpenCvCameraDevice(SpecModel):
     """A camera, video file, stream or sequence of images that OpenCV opens."""
 
-    kind: Literal["opencv"]
+    kind: Literal["opencv"] = Field(description="which camera this is")
     source: Integer | str = Field(
         description="device number, file, URL, or images numbered as in frames/%04d.png"
     )
@@ -150,7 +154,7 @@ class OpenCvCameraDevice(SpecModel):
 class RealSenseCameraDevice(SpecModel):
     """The colour camera of an Intel RealSense; needs the extra `realsense`."""
 
-    kind: Literal["realsense"]
+    kind: Literal["realsense"] = Field(description="which camera this is")
     serial_number: str = Field("", description="of the one to use; empty: the only one")
 
 
@@ -160,7 +164,7 @@ class Camera(SpecModel):
     device: Annotated[
         VirtualCameraDevice | OpenCvCameraDevice | RealSenseCameraDevice,
         Field(discriminator="kind"),
-    ]
+    ] = Field(description="what takes the pictures")
     latency: Duration = Field(
         0.0,
         ge=0,
@@ -168,8 +172,10 @@ class Camera(SpecModel):
         description="from exposure to arrival, taken off a frame's time; what the camera's "
         "calibration has measured goes before it",
     )
-    jpeg_quality: Integer = Field(92, ge=50, le=100)
-    frame_rate: Frequency = Field(ge=0.1, le=1000)
+    jpeg_quality: Integer = Field(
+        92, ge=50, le=100, description="of the pictures in the log, 1 to 100"
+    )
+    frame_rate: Frequency = Field(ge=0.1, le=1000, description="pictures per second at most")
     calibration: str = Field(description="file in calibration/, or a path")
     ruler: str = Field(description="ruler calibration file in calibration/, or a path")
 
@@ -177,27 +183,35 @@ class Camera(SpecModel):
 class Controller(SpecModel):
     """Gains of the PI pressure loop; it commands plunger velocity as volume flow."""
 
-    proportional: FlowGain = Field(gt=0)
-    integral: FlowIntegralGain = Field(ge=0)
+    proportional: FlowGain = Field(gt=0, description="plunger flow per pressure error")
+    integral: FlowIntegralGain = Field(
+        ge=0, description="plunger flow per pressure error and second"
+    )
     feed_forward: Ratio = Field(ge=0, description="share of the isothermal flow demand")
-    deadband: Pressure = Field(ge=0)
-    max_flow: Flow = Field(gt=0)
-    max_flow_acceleration: Acceleration = Field(gt=0)
-    setpoint_rate: PressureRate = Field(gt=0)
+    deadband: Pressure = Field(ge=0, description="errors below this move nothing")
+    max_flow: Flow = Field(gt=0, description="of the plunger")
+    max_flow_acceleration: Acceleration = Field(gt=0, description="how fast the flow may change")
+    setpoint_rate: PressureRate = Field(
+        gt=0, description="how fast the set-point follows what was asked"
+    )
 
 
 class Safety(SpecModel):
     """Limits that the firmware enforces by itself."""
 
-    pressure: Pressure = Field(gt=0)
-    communication_timeout: Duration = Field(gt=0)
+    pressure: Pressure = Field(
+        gt=0, description="gauge pressure at which the board vents by itself"
+    )
+    communication_timeout: Duration = Field(
+        gt=0, description="silence of the host after which the board vents"
+    )
 
 
 class Ambient(SpecModel):
     """The air around the bench."""
 
-    pressure: Pressure = Field(gt=0)
-    temperature: Temperature = Field(gt=0)
+    pressure: Pressure = Field(gt=0, description="absolute pressure of the room")
+    temperature: Temperature = Field(gt=0, description="of the room")
 
 
 class SpecimenVariation(SpecModel):
@@ -206,7 +220,7 @@ class SpecimenVariation(SpecModel):
     wall_thickness: Ratio = Field(ge=0, description="relative")
     young_modulus: Ratio = Field(ge=0, description="relative, of all stiffness")
     creep: Ratio = Field(ge=0, description="share of the response that comes by creep")
-    creep_time: Duration = Field(gt=0)
+    creep_time: Duration = Field(gt=0, description="after which creep has gone 63 % of its way")
     more_creep: tuple[CreepTerm, ...] = Field(
         (), max_length=3, description="terms of the Prony series besides that one"
     )
@@ -215,7 +229,9 @@ class SpecimenVariation(SpecModel):
         0.02, ge=0, description="by which damping lets the shape lag the pressure"
     )  # a guess: damping ratio of about 0.7 with the mass of the shipped actuators
     inertia: bool = Field(False, description="the actuator's mass counts")
-    mullins: Mullins | None = None
+    mullins: Mullins | None = Field(
+        None, description="softening by the highest pressure so far; none if it is left out"
+    )
     ageing: Ratio = Field(0.0, ge=0, description="growth of the response per decade of load cycles")
 
     @model_validator(mode="after")
@@ -233,15 +249,17 @@ class FiniteElementSpecimen(SpecimenVariation):
     """A specimen that obeys finite elements, on a mesh of its own: gravity and stiffening come
     by themselves."""
 
-    response: Literal["fe"]
+    response: Literal["fe"] = Field(description="where the specimen's response comes from")
 
 
 class BeamSpecimen(SpecimenVariation):
     """A specimen that obeys beam theory, bent away from it as said here: ready at once."""
 
-    response: Literal["beam"]
+    response: Literal["beam"] = Field(description="where the specimen's response comes from")
     gravity_offset: Angle = Field(description="mean angle at zero pressure")
-    gravity_offset_spread: Angle = Field(ge=0)
+    gravity_offset_spread: Angle = Field(
+        ge=0, description="standard deviation of `gravity_offset` between specimens"
+    )
     stiffening: Ratio = Field(ge=0, description="strength of the nonlinear stiffening, mean")
     stiffening_spread: Ratio = Field(ge=0, description="relative")
 
@@ -283,7 +301,9 @@ class VirtualSensors(SpecModel):
     load_cell_bow: Mass = Field(ge=0, description="departure from a straight line at half capacity")
     load_cell_noise: Mass = Field(ge=0, description="of one conversion")
     load_cell_creep: Ratio = Field(ge=0, description="of the share of the load that creeps")
-    load_cell_creep_time: Duration = Field(gt=0)
+    load_cell_creep_time: Duration = Field(
+        gt=0, description="after which the cell's creep has gone 63 % of its way"
+    )
     load_cell_drift: Mass = Field(ge=0, description="change of the zero over a long time")
     drift_time: Duration = Field(gt=0, description="correlation time of both zeros")
     bad_word_interval: Duration = Field(gt=0, description="mean time between bad HX711 words")
@@ -293,9 +313,13 @@ class VirtualDrive(SpecModel):
     """How the simulated plunger's drive differs from its drawing; plain numbers are relative
     standard deviations."""
 
-    volume_per_step: Ratio = Field(ge=0)
-    dead_volume: Ratio = Field(ge=0)
-    backlash: Ratio = Field(ge=0)
+    volume_per_step: Ratio = Field(
+        ge=0, description="relative standard deviation of the volume of a step"
+    )
+    dead_volume: Ratio = Field(
+        ge=0, description="relative standard deviation of the syringe's dead volume"
+    )
+    backlash: Ratio = Field(ge=0, description="relative standard deviation of the backlash")
     friction: PlungerFriction | None = Field(
         None, description="none: the seal goes where the nut takes it"
     )
@@ -319,20 +343,22 @@ class VirtualLens(SpecModel):
     """
 
     width: Count = Field(le=20_000, description="of the picture, pixels")
-    height: Count = Field(le=20_000)
+    height: Count = Field(le=20_000, description="of the picture in pixels")
     focal: Number = Field(gt=0, description="pixels")
     focal_spread: Ratio = Field(ge=0, description="relative")
     centre_spread: Number = Field(ge=0, description="about the middle of the picture, pixels")
     distortion: tuple[Number, Number, Number, Number, Number] = Field(
         description="k1, k2, p1, p2, k3 of Brown and Conrady"
     )
-    distortion_spread: tuple[Number, Number, Number, Number, Number]
+    distortion_spread: tuple[Number, Number, Number, Number, Number] = Field(
+        description="standard deviations of k1, k2, p1, p2 and k3 between cameras"
+    )
 
 
 class VirtualOptics(SpecModel):
     """The simulated camera: its lens, where it stands, and what spoils its picture."""
 
-    lens: VirtualLens
+    lens: VirtualLens = Field(description="the lens that cameras are drawn from")
     distance: Length = Field(gt=0, description="camera to the plane of bending")
     ruler_squareness: Angle = Field(
         ge=0, le=math.radians(2), description="standard deviation of the ruler's right angle"
@@ -354,35 +380,43 @@ class VirtualOptics(SpecModel):
 class VirtualBench(SpecModel):
     """All that a simulated bench hides from the experiment."""
 
-    specimen: Annotated[FiniteElementSpecimen | BeamSpecimen, Field(discriminator="response")]
-    pneumatics: VirtualPneumatics
-    drive: VirtualDrive
-    sensors: VirtualSensors
-    references: VirtualReferences
-    optics: VirtualOptics
+    specimen: Annotated[FiniteElementSpecimen | BeamSpecimen, Field(discriminator="response")] = (
+        Field(description="the printed actuator that is drawn")
+    )
+    pneumatics: VirtualPneumatics = Field(description="gas, tube and valve")
+    drive: VirtualDrive = Field(description="how the real drive differs from the drawing")
+    sensors: VirtualSensors = Field(description="noise and drift of transducer and load cell")
+    references: VirtualReferences = Field(description="how wrong the reference instruments are")
+    optics: VirtualOptics = Field(description="camera, light and ruler")
     substeps: Count = Field(1, le=100, description="of the physics in a millisecond")
 
 
 class BenchSpec(SpecModel):
     """One bench: hardware, controller gains, safety limits, and for a virtual one its secrets."""
 
-    kind: Literal["bench"]
+    kind: Literal["bench"] = Field(description="tells that this is a file of this kind")
     name: Name
-    description: str = ""
-    board: Annotated[VirtualBoard | EmulatedBoard | SerialBoard, Field(discriminator="kind")]
-    syringe: Syringe
-    stepper: Stepper
-    lead_screw: LeadScrew
-    tubing: Tubing
-    transducer: Transducer
-    adc: Adc
-    load_cell: LoadCell
-    camera: Camera
-    controller: Controller
-    safety: Safety
-    ambient: Ambient
-    fluid: Annotated[Air | Liquid, Field(discriminator="kind")] = Air()
-    virtual: VirtualBench | None = None
+    description: str = Field("", description="one line for people: what it is and what it is for")
+    board: Annotated[VirtualBoard | EmulatedBoard | SerialBoard, Field(discriminator="kind")] = (
+        Field(description="what the host talks to")
+    )
+    syringe: Syringe = Field(description="what displaces the fluid")
+    stepper: Stepper = Field(description="what turns the lead screw")
+    lead_screw: LeadScrew = Field(description="what pushes the plunger")
+    tubing: Tubing = Field(description="between syringe and actuator")
+    transducer: Transducer = Field(description="measures the pressure")
+    adc: Adc = Field(description="reads the transducer")
+    load_cell: LoadCell = Field(description="measures the blocked force")
+    camera: Camera = Field(description="looks at the side of the actuator")
+    controller: Controller = Field(description="of the pressure, on the board")
+    safety: Safety = Field(description="what the board does by itself")
+    ambient: Ambient = Field(description="of the room")
+    fluid: Annotated[Air | Liquid, Field(discriminator="kind")] = Field(
+        Air(), description="what fills the bench"
+    )
+    virtual: VirtualBench | None = Field(
+        None, description="what only a simulated bench needs; none on a real one"
+    )
 
     @property
     def simulated(self) -> bool:

@@ -32,7 +32,7 @@ class BellowRectangularGeometry(SpecModel):
     default half the bellow's, on the strain-limiting layer.
     """
 
-    family: Literal["bellow-rectangular"]
+    family: Literal["bellow-rectangular"] = Field(description="which geometry this is")
     bellow_number: Count = Field(9, le=200, description="N")
     bellow_length: Length = Field(0.005, gt=0, description="inside, between the two faces")
     spacer_length: Length = Field(0.005, gt=0, description="between the faces of neighbours")
@@ -103,8 +103,8 @@ class _MultiChamberGeometry(SpecModel):
     """
 
     chamber_number: Count = Field(4, le=200, description="chambers in a row")
-    chamber_height: Length = Field(0.008, gt=0)
-    chamber_width: Length = Field(0.008, gt=0)
+    chamber_height: Length = Field(0.008, gt=0, description="inner, square to the layer")
+    chamber_width: Length = Field(0.008, gt=0, description="inner, across the actuator")
     chamber_length: Length = Field(0.002, gt=0, description="along the row")
     wall_thickness: Length = Field(0.007, gt=0, description="around and between chambers")
     passage_height: Length = Field(0.002, gt=0, description="our choice: the paper does not say")
@@ -136,7 +136,7 @@ class _MultiChamberGeometry(SpecModel):
 class MultiChamberBendingGeometry(_MultiChamberGeometry):
     """On an inextensible layer: silk in 0.75 mm of silicone (Fabrication, step 4); in metres."""
 
-    family: Literal["multi-chamber-bending"]
+    family: Literal["multi-chamber-bending"] = Field(description="which geometry this is")
     layer_thickness: Length = Field(0.00075, gt=0, description="silicone with silk in it")
     layer_modulus: Modulus = Field(
         10e6,
@@ -149,4 +149,4 @@ class MultiChamberBendingGeometry(_MultiChamberGeometry):
 class MultiChamberLinearGeometry(_MultiChamberGeometry):
     """Without a layer: lengthens; lengths in metres."""
 
-    family: Literal["multi-chamber-linear"]
+    family: Literal["multi-chamber-linear"] = Field(description="which geometry this is")

@@ -27,9 +27,19 @@ class Curve(SpecModel):
     """A broken line of pressures or of plunger volumes; `file` stands for the CSV that has it."""
 
     file: str | None = Field(None, description="CSV beside the protocol, instead of corners")
-    times: tuple[Duration, ...] = Field((), max_length=MAX_CORNERS)
-    pressures: tuple[Pressure, ...] = Field((), max_length=MAX_CORNERS)
-    volumes: tuple[Volume, ...] = Field((), max_length=MAX_CORNERS)
+    times: tuple[Duration, ...] = Field(
+        (), max_length=MAX_CORNERS, description="of the corners, ascending from 0"
+    )
+    pressures: tuple[Pressure, ...] = Field(
+        (),
+        max_length=MAX_CORNERS,
+        description="gauge pressure at each time; empty for a curve of volumes",
+    )
+    volumes: tuple[Volume, ...] = Field(
+        (),
+        max_length=MAX_CORNERS,
+        description="of the plunger at each time; empty for a curve of pressures",
+    )
 
     @model_validator(mode="after")
     def _one_broken_line(self) -> Curve:

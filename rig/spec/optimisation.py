@@ -30,28 +30,28 @@ class WantedResponse(StudyResponse):
 class CobylaSearch(SpecModel):
     """COBYLA with basin hopping from several starting points; one objective."""
 
-    kind: Literal["cobyla"]
-    starts: Count = 4
-    hops: Integer = Field(3, ge=0)
+    kind: Literal["cobyla"] = Field(description="which search this is")
+    starts: Count = Field(4, description="beginnings from which it searches")
+    hops: Integer = Field(3, ge=0, description="jumps away from the best one found")
     evaluations: Count = Field(60, description="most of one descent")
-    seed: Integer = Field(0, ge=0)
+    seed: Integer = Field(0, ge=0, description="of the beginnings and jumps")
 
 
 class NsgaSearch(SpecModel):
     """NSGA-II; two objectives or more, or one."""
 
-    kind: Literal["nsga2"]
-    population: Integer = Field(40, ge=8)
-    generations: Count = 30
-    seed: Integer = Field(0, ge=0)
+    kind: Literal["nsga2"] = Field(description="which search this is")
+    population: Integer = Field(40, ge=8, description="designs of a generation")
+    generations: Count = Field(30, description="how many follow each other")
+    seed: Integer = Field(0, ge=0, description="of the draws")
 
 
 class BayesianSearch(SpecModel):
     """Tree-structured Parzen estimators, for answers that are dear; one objective."""
 
-    kind: Literal["bayesian"]
-    evaluations: Count = 40
-    seed: Integer = Field(0, ge=0)
+    kind: Literal["bayesian"] = Field(description="which search this is")
+    evaluations: Count = Field(40, description="designs that are computed")
+    seed: Integer = Field(0, ge=0, description="of the draws")
 
 
 Search = Annotated[CobylaSearch | NsgaSearch | BayesianSearch, Field(discriminator="kind")]
@@ -60,13 +60,17 @@ Search = Annotated[CobylaSearch | NsgaSearch | BayesianSearch, Field(discriminat
 class OptimisationSpec(SpecModel):
     """A search over fields of an actuator and its material; levels of the factors are bounds."""
 
-    kind: Literal["optimisation"]
+    kind: Literal["optimisation"] = Field(description="tells that this is a file of this kind")
     name: Name
-    description: str = ""
+    description: str = Field("", description="one line for people: what it is and what it is for")
     actuator: str = Field(description="name of a file in models/actuators, or a path")
-    factors: tuple[StudyFactor, ...] = Field(min_length=1)
-    responses: tuple[WantedResponse, ...] = Field(min_length=1)
-    search: Search
+    factors: tuple[StudyFactor, ...] = Field(
+        min_length=1, description="what is varied, and between which bounds"
+    )
+    responses: tuple[WantedResponse, ...] = Field(
+        min_length=1, description="what is wanted of the design"
+    )
+    search: Search = Field(description="how it is sought")
 
     @model_validator(mode="after")
     def _consistent(self) -> OptimisationSpec:

@@ -27,7 +27,7 @@ from rig.spec.quantity import (
 class Air(SpecModel):
     """The bench is full of air."""
 
-    kind: Literal["air"] = "air"
+    kind: Literal["air"] = Field("air", description="which fluid this is")
 
 
 class Liquid(SpecModel):
@@ -36,9 +36,13 @@ class Liquid(SpecModel):
     The defaults are those of water at 20 degC that was filled in without being degassed.
     """
 
-    kind: Literal["liquid"]
-    density: Density = Field(998.2, gt=0)  # CRC Handbook of Chemistry and Physics
-    viscosity: Viscosity = Field(1.002e-3, gt=0)  # the same
+    kind: Literal["liquid"] = Field(description="which fluid this is")
+    density: Density = Field(
+        998.2, gt=0, description="mass per volume"
+    )  # CRC Handbook of Chemistry and Physics
+    viscosity: Viscosity = Field(
+        1.002e-3, gt=0, description="dynamic, at the bench's temperature"
+    )  # the same
     bulk_modulus: Pressure = Field(2.18e9, gt=0, description="without bubbles")  # the same
     entrained_air: Ratio = Field(
         0.005, gt=0, lt=1, description="share of the volume that is bubbles, at ambient pressure"
@@ -86,7 +90,7 @@ class CreepTerm(SpecModel):
     """One term of a Prony series."""
 
     share: Ratio = Field(gt=0, lt=1, description="of the response")
-    time: Duration = Field(gt=0)
+    time: Duration = Field(gt=0, description="after which this term has gone 63 % of its way")
 
 
 class Mullins(SpecModel):

@@ -16,9 +16,9 @@ MAX_STEPS = 1000
 class PressureSteps(SpecModel):
     """Gauge pressures from `start` to `stop` in equal steps, both ends included."""
 
-    start: Pressure = Field(0.0, ge=0)
-    stop: Pressure = Field(10e3, gt=0)
-    step: Pressure = Field(1e3, gt=0)
+    start: Pressure = Field(0.0, ge=0, description="lowest gauge pressure")
+    stop: Pressure = Field(10e3, gt=0, description="highest gauge pressure")
+    step: Pressure = Field(1e3, gt=0, description="between neighbours")
 
     @model_validator(mode="after")
     def _whole_steps(self) -> PressureSteps:
@@ -38,9 +38,9 @@ class PressureSteps(SpecModel):
 class Settling(SpecModel):
     """A pressure has settled when it stayed within `tolerance` for `window`."""
 
-    tolerance: Pressure = Field(50.0, gt=0)
-    window: Duration = Field(1.0, gt=0)
-    timeout: Duration = Field(60.0, gt=0, le=DAY_S)
+    tolerance: Pressure = Field(50.0, gt=0, description="of the pressure about the set-point")
+    window: Duration = Field(1.0, gt=0, description="for which it must stay within")
+    timeout: Duration = Field(60.0, gt=0, le=DAY_S, description="after which the run fails")
 
     @model_validator(mode="after")
     def _window_before_timeout(self) -> Settling:
@@ -55,12 +55,12 @@ class Settling(SpecModel):
 class SweepProtocol(SpecModel):
     """What both experiments share: visit each pressure, settle, hold, measure, repeat."""
 
-    pressures: PressureSteps = PressureSteps()
+    pressures: PressureSteps = Field(PressureSteps(), description="the levels of a sweep")
     repeats: Count = Field(5, le=1000, description="ascending sweeps, each from the vented state")
     descending_repeats: Integer = Field(
         0, ge=0, description="how many of the last repeats also come down again (hysteresis)"
     )
-    settling: Settling = Settling()
+    settling: Settling = Field(Settling(), description="when a level counts as reached")
     hold: Duration = Field(30.0, ge=0, le=DAY_S, description="wait after settling, against creep")
     conditioning: Integer = Field(
         0,
@@ -97,12 +97,18 @@ class BlockedForceProtocol(SweepProtocol):
 class ProtocolSpec(SpecModel):
     """A protocol file; an experiment that is absent is not run."""
 
-    kind: Literal["protocol"]
+    kind: Literal["protocol"] = Field(description="tells that this is a file of this kind")
     name: Name
-    description: str = ""
-    deformation: DeformationProtocol | None = None
-    blocked_force: BlockedForceProtocol | None = None
-    trials: tuple[Trial, ...] = Field((), max_length=100)
+    description: str = Field("", description="one line for people: what it is and what it is for")
+    deformation: DeformationProtocol | None = Field(
+        None, description="sweeps with the tip free; none if it is left out"
+    )
+    blocked_force: BlockedForceProtocol | None = Field(
+        None, description="sweeps with the tip at the load cell; none if it is left out"
+    )
+    trials: tuple[Trial, ...] = Field(
+        (), max_length=100, description="what follows the sweeps, in this order"
+    )
 
     @model_validator(mode="after")
     def _at_least_one_experiment(self) -> ProtocolSpec:

@@ -12,20 +12,20 @@ from rig.spec.base import Number, SpecModel
 class PublishedValue(SpecModel):
     """One figure of a paper, as printed there."""
 
-    experiment: Literal["deformation", "blocked_force"]
-    model: Literal["beam", "fe"]
-    statistic: Literal["rmse"]
+    experiment: Literal["deformation", "blocked_force"] = Field(description="what was measured")
+    model: Literal["beam", "fe"] = Field(description="which model was compared")
+    statistic: Literal["rmse"] = Field(description="of the model's error")
     value: Number = Field(description="in `unit`, as printed")
-    unit: Literal["deg", "g"]
+    unit: Literal["deg", "g"] = Field(description="of `value`")
     where: str = Field(min_length=1, description="section of the paper")
 
 
 class PublishedReference(SpecModel):
     """Figures of one paper; where the paper contradicts itself both versions are listed."""
 
-    kind: Literal["published"]
-    name: str = Field(min_length=1)
-    citation: str = Field(min_length=1)
-    note: str = ""
+    kind: Literal["published"] = Field(description="tells that this is a file of this kind")
+    name: str = Field(min_length=1, description="of the entry")
+    citation: str = Field(min_length=1, description="of the paper")
+    note: str = Field("", description="what must be known to read the values")
     actuator_family: str = Field(description="family of the actuators that were measured")
-    values: tuple[PublishedValue, ...] = Field(min_length=1)
+    values: tuple[PublishedValue, ...] = Field(min_length=1, description="as they are printed")

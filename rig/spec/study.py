@@ -47,39 +47,43 @@ class StudyFactor(SpecModel):
 class BoxBehnkenDesign(SpecModel):
     """Midpoints of the cube's edges, and its centre; three factors or more."""
 
-    kind: Literal["box-behnken"]
-    centre_points: Count = 3
+    kind: Literal["box-behnken"] = Field(description="which design this is")
+    centre_points: Count = Field(3, description="runs in the middle")
 
 
 class CentralCompositeDesign(SpecModel):
     """Corners, centre, and points on the axes: beyond the levels, or within them."""
 
-    kind: Literal["central-composite"]
-    face: Literal["circumscribed", "inscribed", "faced"] = "faced"
-    centre_points: Count = 4
+    kind: Literal["central-composite"] = Field(description="which design this is")
+    face: Literal["circumscribed", "inscribed", "faced"] = Field(
+        "faced", description="where the star points are"
+    )
+    centre_points: Count = Field(4, description="runs in the middle")
 
 
 class FullFactorialDesign(SpecModel):
     """All combinations of evenly spaced levels."""
 
-    kind: Literal["full-factorial"]
-    levels: Integer = Field(2, ge=2, le=9)
+    kind: Literal["full-factorial"] = Field(description="which design this is")
+    levels: Integer = Field(2, ge=2, le=9, description="of each factor")
 
 
 class FractionalFactorialDesign(SpecModel):
     """A fraction of the two-level factorial, told by generators such as 'a b c abc'."""
 
-    kind: Literal["fractional-factorial"]
-    generators: str = Field(pattern=r"^[+-]?[a-z]+( [+-]?[a-z]+)*$")
-    centre_points: Integer = Field(0, ge=0)
+    kind: Literal["fractional-factorial"] = Field(description="which design this is")
+    generators: str = Field(
+        pattern=r"^[+-]?[a-z]+( [+-]?[a-z]+)*$", description="words of the design, as `a b c ab`"
+    )
+    centre_points: Integer = Field(0, ge=0, description="runs in the middle")
 
 
 class SpaceFillingDesign(SpecModel):
     """Points of a Latin hypercube or a Sobol sequence (scrambled), between the levels."""
 
-    kind: Literal["latin-hypercube", "sobol"]
-    points: Count
-    seed: Integer = Field(0, ge=0)
+    kind: Literal["latin-hypercube", "sobol"] = Field(description="which design this is")
+    points: Count = Field(description="how many")
+    seed: Integer = Field(0, ge=0, description="of the draws")
 
 
 Design = Annotated[
@@ -96,12 +100,14 @@ class StudyResponse(SpecModel):
     """One number of every point: a quantity of a model, of a recorded run, or of the shape."""
 
     name: Name
-    quantity: QuantityName
+    quantity: QuantityName = Field(description="what is asked of the models")
     model: Literal["beam", "fe", "run", "shape"] = Field(
         description="run: of the run folder that is called as the point; shape: at rest"
     )
     pressure: Pressure = Field(0.0, ge=0, description="not of shapes")
-    goal: Literal["maximise", "minimise"] | None = None
+    goal: Literal["maximise", "minimise"] | None = Field(
+        None, description="what is better; none if it is only looked at"
+    )
     at_least: Number | None = Field(None, description=_IN_UNITS)
     at_most: Number | None = Field(None, description=_IN_UNITS)
 
@@ -143,22 +149,24 @@ def require_distinct(factors: Sequence[StudyFactor], responses: Sequence[StudyRe
 class StudySpec(SpecModel):
     """A designed experiment."""
 
-    kind: Literal["study"]
+    kind: Literal["study"] = Field(description="tells that this is a file of this kind")
     name: Name
-    description: str = ""
+    description: str = Field("", description="one line for people: what it is and what it is for")
     actuator: str = Field(description="name of a file in models/actuators, or a path")
     runs: str | None = Field(
         None, description="folder of the recorded runs, of responses of the model 'run'"
     )
-    factors: tuple[StudyFactor, ...] = Field(min_length=1)
-    design: Design
+    factors: tuple[StudyFactor, ...] = Field(
+        min_length=1, description="what is varied, and between which bounds"
+    )
+    design: Design = Field(description="which combinations are computed")
     check_points: Integer = Field(
         0,
         ge=0,
         description="points between the levels, of a Latin hypercube, that surfaces are not "
         "fitted to but judged by",
     )
-    responses: tuple[StudyResponse, ...] = Field(min_length=1)
+    responses: tuple[StudyResponse, ...] = Field(min_length=1, description="what is asked of each")
 
     @model_validator(mode="after")
     def _consistent(self) -> StudySpec:

@@ -15,9 +15,9 @@ class CharucoTarget(SpecModel):
     """
 
     columns: Integer = Field(9, ge=4, le=20, description="squares across")
-    rows: Integer = Field(6, ge=4, le=20)
-    square: Length = Field("16 mm", gt=0, validate_default=True)
-    marker: Length = Field("12 mm", gt=0, validate_default=True)
+    rows: Integer = Field(6, ge=4, le=20, description="of squares")
+    square: Length = Field("16 mm", gt=0, validate_default=True, description="edge of a square")
+    marker: Length = Field("12 mm", gt=0, validate_default=True, description="edge of a marker")
 
     @model_validator(mode="after")
     def _markers_fit(self) -> CharucoTarget:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
 from datetime import date
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from rig.spec.base import SpecModel
 from rig.spec.check import yaml_beneath
 from rig.spec.schema import editor_associations, schema_texts, schemas
 from rig.spec.tree import parse_tree
@@ -142,3 +144,21 @@ def test_editors_are_told_which_schema_is_for_which_file() -> None:
         assert json.loads((ROOT / schema).read_text(encoding="utf-8"))["title"].startswith("rig ")
         for glob in globs:
             assert list(ROOT.glob(glob))
+
+
+def models(model: type[SpecModel] = SpecModel) -> Iterator[type[SpecModel]]:
+    for inner in model.__subclasses__():
+        yield inner
+        yield from models(inner)
+
+
+def test_every_field_says_what_it_means() -> None:
+    """The form of the studio, editors and the site's reference show it."""
+    silent = {
+        f"{model.__name__}.{name}"
+        for model in models()
+        if model.__module__.startswith("rig.spec")
+        for name, field in model.model_fields.items()
+        if not field.description
+    }
+    assert silent == set()

@@ -75,7 +75,7 @@ def pages(studio: str) -> Iterator[Pages]:
 def test_finite_elements_go_from_start_to_result(pages: Pages, studio: str) -> None:
     """In the plane, which takes a second: the solid is below."""
     page = pages()
-    page.goto(f"{studio}/?actuator=bellow-axisymmetric")
+    _open(page, f"{studio}/?actuator=bellow-axisymmetric")
     page.get_by_label("pressure limit (kPa)").fill("5")
     _sound(page)
     _press(page, "Compute")
@@ -93,7 +93,7 @@ def test_finite_elements_go_from_start_to_result(pages: Pages, studio: str) -> N
 
 def test_finite_elements_are_cancelled_and_two_designs_compared(pages: Pages, studio: str) -> None:
     page = pages()
-    page.goto(studio)
+    _open(page, studio)
     _press(page, "Compute")
     page.get_by_text("finite elements, tip free").wait_for()
     _press(page, "Cancel")
@@ -114,7 +114,7 @@ def test_two_runs_are_played_in_step(pages: Pages, studio: str, lab: Path) -> No
     for seed in (1, 2):
         record_run(Workspace(lab), lab / f"logs/run-seed{seed}", seed)
     page = pages()
-    page.goto(f"{studio}/runs")
+    _open(page, f"{studio}/runs")
     page.get_by_label("filter").fill("seed1")
     page.get_by_role("row", name="run-seed2").wait_for(state="detached")
     page.get_by_label("filter").fill("")
@@ -148,7 +148,7 @@ def test_two_runs_are_played_in_step(pages: Pages, studio: str, lab: Path) -> No
 @pytest.mark.slow  # a solid
 def test_the_deformed_solid_is_shown_with_its_stress(pages: Pages, studio: str) -> None:
     page = pages()
-    page.goto(studio)
+    _open(page, studio)
     page.get_by_label("bellow number").fill("2")
     page.get_by_label("effective length (mm)").fill("22")
     page.get_by_label("pressure limit (kPa)").fill("1")
@@ -166,7 +166,7 @@ def test_the_deformed_solid_is_shown_with_its_stress(pages: Pages, studio: str) 
 @pytest.mark.slow  # and a browser that stalls for 3 s loses its seat: not for a loaded gate
 def test_design_export_run_and_a_pulled_network(pages: Pages, studio: str, lab: Path) -> None:
     page = pages()
-    page.goto(studio)
+    _open(page, studio)
     page.get_by_label("wall thickness (mm)").fill("9")
     page.get_by_text("reduce wall_thickness below 2.75 mm").wait_for()
     page.get_by_label("wall thickness (mm)").fill("1.4")
@@ -186,11 +186,11 @@ def test_design_export_run_and_a_pulled_network(pages: Pages, studio: str, lab: 
     page.close()
 
     watching = pages()
-    watching.goto(f"{studio}/bench")
+    _open(watching, f"{studio}/bench")
     with Network() as network:
         proxy = {"server": f"socks5://127.0.0.1:{network.port}", "bypass": "<-loopback>"}
         page = pages(proxy=proxy)
-        page.goto(f"{studio}/bench")
+        _open(page, f"{studio}/bench")
         _at_the_bench(page)
         _press(page, "Run")
         _says(page, "doing", "14 points")
@@ -222,6 +222,12 @@ def test_design_export_run_and_a_pulled_network(pages: Pages, studio: str, lab: 
     _says(watching, "state", "idle")
     _says(watching, "flags", "valve open")
     watching.close()
+
+
+def _open(page: Any, address: str) -> None:
+    """What is typed before the page is connected is lost."""
+    page.goto(address)
+    page.wait_for_function("typeof live != 'undefined' && live?.readyState == WebSocket.OPEN")
 
 
 def _at_the_bench(page: Any) -> None:
