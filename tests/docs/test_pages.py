@@ -123,3 +123,11 @@ def test_plots_hold_the_numbers_of_the_pages_table() -> None:
     assert curves(table, "a (b)", "c").startswith("<svg")
     with pytest.raises(ValueError, match="no table"):
         read_table(page, "U")
+
+
+def test_no_formula_of_a_theory_page_is_a_block_of_code() -> None:
+    for page in sorted((ROOT / "docs/theory").glob("*.md")):
+        prose = re.sub(
+            r"^ *```.*?^ *```", "", page.read_text("utf-8"), flags=re.DOTALL | re.MULTILINE
+        )
+        assert re.findall(r"^    \S.*=.*", prose, re.MULTILINE) == [], page.name
