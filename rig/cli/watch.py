@@ -15,21 +15,27 @@ def watch(
     run: Annotated[Path, typer.Argument(help="Folder of a run, or its run.mcap.")],
     port: Annotated[int, typer.Option(min=0, max=65535, help="0 takes a free one.")] = 8765,
     speed: Annotated[
-        float, typer.Option(min=0.0, help="Bench time against the clock; 0 sends all at once.")
-    ] = 1.0,
+        float | None,
+        typer.Option(
+            min=0.0,
+            help="Bench time against the clock; 0 sends what is there at once. Without it a run "
+            "that has ended is played at 1, one in progress is sent as it comes.",
+        ),
+    ] = None,
 ) -> None:
     """Serve the channels of a run to Foxglove, on this machine alone.
 
-    Starts when somebody subscribes, at the beginning of the run, and ends with it. A run in
-    progress is followed through its log, which grows a chunk at a time, at each point at the
-    latest: it is watched with that delay, and never disturbed. Nobody can send anything to it. The
-    layout beside the log shows pressure, angle, load cell, camera and events.
+    Starts when somebody subscribes and ends with the run. A run in progress is followed through
+    its log, so that watching never disturbs it: what happened before comes at once, and then what
+    happens, a second late on a real bench. Simulated runs write their log in larger pieces. Nobody
+    can send anything to a run. The layout beside the log shows pressure, angle, load cell, camera
+    and events.
 
     Example: `rig watch logs/bellow-bending-virtual-seed1 --speed 5`
     """
     from rig.record.follow import LogFollower
     from rig.record.layout import LAYOUT_FILE
-    from rig.record.live import LiveServer, relay
+    from rig.record.live import LiveServer, pace, relay
 
     follower = LogFollower(run)
     with LiveServer(port) as server:
@@ -38,5 +44,5 @@ def watch(
         if layout.is_file():
             typer.echo(f"Layout: Import from file, {layout}")
         typer.echo("Waiting for a subscriber; Ctrl-C ends it.")
-        sent = relay(follower, server, speed)
+        sent = relay(follower, server, pace(follower) if speed is None else speed)
     typer.echo(f"The run has ended; {sent} messages were sent.")

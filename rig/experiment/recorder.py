@@ -11,6 +11,8 @@ from rig.record.writer import RunWriter
 
 BATCH_FRAMES = 1000
 """Frames gathered before they go to the log; a point flushes them first."""
+LIVE_S = 1.0
+"""On a bench that runs with the clock the log is never further behind: `rig watch` follows it."""
 
 
 class LinkRecorder:
@@ -30,13 +32,23 @@ class LinkRecorder:
         """Take a batch."""
         self._frames += frames
         self._messages += messages
-        if len(self._frames) >= BATCH_FRAMES:
+        if len(self._frames) >= BATCH_FRAMES or self._is_awaited():
             self.flush()
+
+    def _is_awaited(self) -> bool:
+        """Whether somebody may be watching who has seen nothing for a while."""
+        return (
+            self._record.is_live
+            and bool(self._frames)
+            and self._frames[-1].time_s - self._frames[0].time_s >= LIVE_S
+        )
 
     def flush(self) -> None:
         """Write what was gathered."""
         try:
             self._write()
+            if self._record.is_live:
+                self._record.hand_on()
         except OSError:
             if not self._may_drop:
                 raise

@@ -71,6 +71,12 @@ class LogFollower:
                 self._offset += size
         return chunks
 
+    def ended(self) -> bool:
+        """Whether the log is closed already; what `poll` says next does not change by asking."""
+        other = LogFollower(self.path)
+        other.poll()
+        return other.finished
+
     def messages(self, chunk: tuple[int, int]) -> Iterator[tuple[LoggedChannel, int, bytes]]:
         """Channel, log time in ns and payload of every message of a chunk, as they were written."""
         start, length = chunk

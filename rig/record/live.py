@@ -110,6 +110,11 @@ class _Listener:
         """A client that leaves changes nothing: the run goes on."""
 
 
+def pace(follower: LogFollower) -> float:
+    """Speed of a log unless told: as it comes while it grows, else like the clock."""
+    return 1.0 if follower.ended() else 0.0
+
+
 def relay(follower: LogFollower, server: LiveServer, speed: float) -> int:
     """Serve a log from its beginning to its end, waiting for more while it is being written.
 

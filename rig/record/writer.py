@@ -83,6 +83,8 @@ class RunWriter:
         self._formatters: dict[str, tuple[int, RowFormatter]] = {}
         self._can_channel: int | None = None
         self._closed = False
+        self.is_live = False
+        """Whether bench time is the clock's, so that somebody may watch the log while it grows."""
         log.keep_uncompressed("camera")
 
     @classmethod
@@ -115,6 +117,7 @@ class RunWriter:
             raise RecordError(f"{folder}: the log cannot be made: {error.strerror}.") from error
         writer = cls(folder, BulkWriter(stream), lock, stream)
         writer._units = units or {}
+        writer.is_live = start.created is not None
         writer._log.start(LIBRARY)
         for name, data in attachments.items():
             suffix = PurePosixPath(name).suffix
@@ -164,7 +167,8 @@ class RunWriter:
         except OSError as error:
             raise RecordError(f"{path}: the log cannot be read: {error.strerror}.") from error
         found = scan_log(path, memoryview(content))
-        if all(entry.metadata.name != START_METADATA for entry in found.metadata):
+        starts = [e.metadata for e in found.metadata if e.metadata.name == START_METADATA]
+        if not starts:
             raise RecordError(
                 f"{path}: the log ends before the set-up of the run was written, so there is "
                 f"nothing to resume. Start a new run with `rig characterise`."
@@ -187,6 +191,7 @@ class RunWriter:
         _sync_folder(folder)
         writer = cls(folder, log, lock, stream)
         writer._units = units or {}
+        writer.is_live = json.loads(starts[0].metadata["document"]).get("created") is not None
         return writer
 
     def __enter__(self) -> RunWriter:
@@ -278,6 +283,10 @@ class RunWriter:
             message=json.dumps(data),
         )
         self._log.add("log", channel_id, times_ns, [line.SerializeToString()])
+
+    def hand_on(self) -> None:
+        """Let readers of the file see what was written; the disk is not waited for."""
+        self._log.flush()
 
     def point(self, document: PointDocument, time_s: float) -> None:
         """A completed point; when this returns it and everything before it is on disk."""

@@ -212,6 +212,7 @@ def test_design_export_run_and_a_pulled_network(pages: Pages, studio: str, lab: 
     _says(watching, "control", "yours")
     _press(watching, "Home")
     _says(watching, "flags", "homed")
+    _says(watching, "state", "idle")
     _press(watching, "Zero pressure")
     _says(watching, "flags", "zeroed")
     watching.get_by_label("set-point (kPa)").fill("4")
@@ -238,6 +239,7 @@ def _at_the_bench(page: Any) -> None:
     _press(page, "Connect")
     _says(page, "state", "idle")
     _says(page, "notes", "known within")
+    page.wait_for_function("document.querySelector('[data-live=doing]').textContent == ''")
 
 
 def _press(page: Any, name: str) -> None:
