@@ -18,7 +18,7 @@ from rig.control.excitation import Segment
 from rig.control.family import Family, Fluid
 from rig.control.identify import LevelModel
 from rig.control.loop import Gains, Margins, margins
-from rig.control.lqg import LinearQuadraticGaussian
+from rig.control.lqg import LinearQuadraticGaussian, ramp_gain, robust_regulator
 from rig.control.physics import motor_limit_s
 from rig.control.step import step_metrics
 from rig.control.tune import Tuning
@@ -35,8 +35,9 @@ Array = NDArray[np.float64]
 Kind = Literal["board", "scheduled", "host"]
 FAST_KPA_S = 20.0
 """Rate of the set-point: the firmware lowers it to what the drive can follow."""
-RAMP_SHARE = 0.8
-"""Of the drive's flow and acceleration that the host's set-point may ask for, as the firmware's."""
+HOST_SHARE = 0.85
+"""Of the drive's flow and acceleration that the host's set-point may ask for; from 0.95 on it
+overshoots by a tenth."""
 STEADY_SHARE = 0.3
 """Of a hold, at its end, that counts as steady."""
 FAULT_SHARE = 0.8
@@ -208,6 +209,14 @@ class StatedMargins(NamedTuple):
     phase_deg: float
 
 
+class Host(NamedTuple):
+    """What the regulator in the host is made of."""
+
+    model: LevelModel
+    noise_kpa: float
+    weight_ml_s: float
+
+
 @dataclass(frozen=True)
 class Controller:
     """One way to regulate; `parameters` go to the board first."""
@@ -218,9 +227,8 @@ class Controller:
     margins: StatedMargins
     schedule: dict[float, dict[str, float]] = field(default_factory=dict)
     """For a scheduled one: parameters by set-point in kPa."""
-    model: LevelModel | None = None
-    """For one in the host: what it knows of the plant."""
-    noise_kpa: float = 0.0
+    host: Host | None = None
+    """For one in the host."""
 
 
 def contenders(family: Family, tuning: Tuning) -> tuple[Controller, ...]:
@@ -232,8 +240,8 @@ def contenders(family: Family, tuning: Tuning) -> tuple[Controller, ...]:
     untuned = {name: family.parameters[name] for name in board_gains(tuning.single)}
     shipped = Gains(untuned["proportional_ml_s_kpa"], untuned["integral_ml_s2_kpa"])
     members = [one.member.model for one in tuning.single.members]
-    lqg = LinearQuadraticGaussian(
-        middle, family.noise_kpa, SAMPLE_S, family.parameters["max_flow_ml_s"]
+    lqg = robust_regulator(
+        middle, members, family.noise_kpa, SAMPLE_S, family.parameters["max_flow_ml_s"]
     )
     scheduled = [one.margins for design in tuning.schedule.values() for one in design.members]
     single = _worst([one.margins for one in tuning.single.members])
@@ -253,8 +261,7 @@ def contenders(family: Family, tuning: Tuning) -> tuple[Controller, ...]:
             "host",
             tuned,
             _worst([lqg.margins(model) for model in members]),
-            model=middle,
-            noise_kpa=family.noise_kpa,
+            host=Host(middle, family.noise_kpa, lqg.weight_ml_s),
         ),
     )
 
@@ -334,15 +341,17 @@ def _run(
 def _in_the_host(
     link: RigLink, controller: Controller, case: Case, known: dict[str, float]
 ) -> tuple[list[Message], float]:
-    assert controller.model is not None
+    assert controller.host is not None
+    model, noise_kpa, weight_ml_s = controller.host
     regulator = LinearQuadraticGaussian(
-        controller.model, controller.noise_kpa, SAMPLE_S, known["max_flow_ml_s"]
+        model, noise_kpa, SAMPLE_S, known["max_flow_ml_s"], weight_ml_s
     )
-    stiffness = controller.model.static_gain
-    course = _Course(
-        RAMP_SHARE * known["max_flow_ml_s"] * stiffness,
-        RAMP_SHARE * known["max_flow_acceleration_ml_s2"] * stiffness,
-    )
+    gain = ramp_gain(model)
+    rate = min(HOST_SHARE * known["max_flow_ml_s"] * gain, known["setpoint_rate_kpa_s"])
+    change = HOST_SHARE * known["max_flow_acceleration_ml_s2"] * gain
+    for mode in model.modes:  # a ramp that begins within one period of a swing does not start it
+        change = min(change, rate * mode.frequency / (2 * math.pi))
+    course = _Course(rate, change)
     link.command("hold")
     link.await_state("hold", 1.0)
     messages: list[Message] = []

@@ -55,8 +55,8 @@ def test_margins_of_an_integrator_with_delay_have_closed_forms(delay_s: float) -
     assert found.phase_deg == pytest.approx(90 - math.degrees(crossover * late), abs=0.1)
     assert found.phase_crossover == pytest.approx(math.pi / 2 / late, rel=0.01)
     assert found.gain == pytest.approx(math.pi / 2 / late / crossover, rel=0.02)
-    # at 2 dB more gain, where the crossover is further up
-    fast = crossover * 10 ** (2 / 20)
+    # at 3 dB more gain, where the crossover is further up
+    fast = crossover * 10 ** (3 / 20)
     assert found.delay_s == pytest.approx(math.pi / 2 / fast - late, rel=0.05)
 
 
@@ -80,7 +80,7 @@ def test_the_gain_margin_is_where_the_poles_leave_the_circle() -> None:
 
 def test_the_delay_margin_is_where_the_poles_leave_the_circle() -> None:
     found = margins(MODEL, GAINS)
-    quick = Gains(1.259 * GAINS.proportional, 1.259 * GAINS.integral)  # 2 dB
+    quick = Gains(1.4125 * GAINS.proportional, 1.4125 * GAINS.integral)  # 3 dB
     for factor, stable in ((0.93, True), (1.07, False)):
         late = replace(MODEL, delay_s=MODEL.delay_s + factor * found.delay_s)
         assert (radius(late, quick) < 1) == stable

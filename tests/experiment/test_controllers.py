@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from rig.board.virtual import VirtualBench
-from rig.control.identify import LevelModel
+from rig.control.identify import LevelModel, Mode
 from rig.control.loop import Gains
-from rig.control.lqg import LinearQuadraticGaussian
+from rig.control.lqg import LinearQuadraticGaussian, robust_regulator
 from rig.control.tune import Wanted, tune
 from rig.experiment.controllers import (
     GAS_CASES,
@@ -132,6 +132,23 @@ def test_robustness_is_the_worst_of_the_volumes() -> None:
     assert standing.worst_volume == pytest.approx(1.5)
     assert (standing.mae_kpa, standing.sine_mae_kpa) == (0.1, 0.2)
     assert (standing.gain_db, standing.phase_deg) == (8.0, 70.0)
+
+
+def test_a_regulator_for_a_swing_uses_less_flow_until_it_keeps_its_margins() -> None:
+    def swinging(gain: float) -> LevelModel:
+        return LevelModel(
+            5.0, 3.0, 40.0 * gain, (), (), 0.006, 0.0, modes=(Mode(-37.0 * gain, 26.0, 0.09),)
+        )
+
+    members = [swinging(gain) for gain in (0.8, 1.0, 1.3)]
+    bold = LinearQuadraticGaussian(swinging(1.0), 0.02, 0.02, 4.0)
+    assert min(bold.margins(one).gain_db for one in members) < 6
+    found = robust_regulator(swinging(1.0), members, 0.02, 0.02, 4.0)
+    assert found.weight_ml_s < bold.weight_ml_s
+    assert min(found.margins(one).gain_db for one in members) >= 6
+    assert min(found.margins(one).phase_deg for one in members) >= 45
+    calm = robust_regulator(realistic(5.0), [realistic(5.0)], NOISE_KPA, 0.02, 8.0)
+    assert calm.weight_ml_s == bold.weight_ml_s
 
 
 @pytest.mark.parametrize(("share", "quiet"), [(0.9, True), (1.1, False)])
