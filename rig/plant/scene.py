@@ -224,8 +224,7 @@ class Scene:
         width, height = self._projection.width, self._projection.height
         light = background[:, None, None] * _cloth(width, height, rng)
         for thing in clutter:
-            cover = self._cover(thing.outline, self._whole)
-            light = _over(light, thing.colour[:, None, None], cover)
+            self._lay(light, thing.outline, thing.colour)
         left, top, right, _ = self._projection.view()
         overhang = right - left
         edge = self._layout.frame_edge
@@ -240,14 +239,22 @@ class Scene:
         brushed = ALUMINIUM[:, None, None] * _brushed(width, height, rng)
         light = _over(light, brushed, self._cover(frame, self._whole))
         corner = self._layout.ruler_corner
-        outline = self._cover(ruler_outline(corner, ruler), self._whole)
-        light = _over(light, MATTE_WHITE[:, None, None], outline)
+        self._lay(light, ruler_outline(corner, ruler), MATTE_WHITE)
         turn = np.linspace(0, 2 * np.pi, 180, endpoint=False)
         disc = 0.5 * MARK_DIAMETER * np.column_stack((np.cos(turn), np.sin(turn)))
         for centre in mark_centres(corner, ruler, self._layout.ruler_lean):
-            mark = self._cover(centre + disc, self._whole)
-            light = _over(light, MARK_BLACK[:, None, None], mark)
+            self._lay(light, centre + disc, MARK_BLACK)
         return light
+
+    def _lay(self, light: Picture, outline: Array, colour: Picture) -> None:
+        """Put a thing of one `colour` on `light` (3, height, width), in place.
+
+        Only the pixels that its `outline`, in bench metres, touches: most things are small.
+        """
+        pixels = self._projection.project(densified(outline, _OUTLINE_STEP))
+        box = bounding_box([pixels], 0, self._whole)
+        here = light[:, *box.slices]
+        here[:] = _over(here, colour[:, None, None], coverage(pixels, box))
 
 
 def developed(light: Picture, blur: float) -> Image:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from rig.vision.lines import FloatArray, independent_share
+from rig.vision.lines import FloatArray, independent_share, lag_one_correlation
 
 LOOSE_MM = 0.2  # beyond which points pull less: a dent, a thread
 VALUES = 3
@@ -60,7 +60,7 @@ class Circle:
         Also its degrees of freedom: of the points that count as independent.
         """
         off, inverse = self.off(points), np.linalg.pinv(self._jacobian(points))
-        independent = max(len(off) * independent_share(off), VALUES + 1.0)
+        independent = max(len(off) * independent_share(lag_one_correlation(off)), VALUES + 1.0)
         dof = independent - VALUES
         variance = float(off @ off) / len(off) * independent / dof
         return variance * len(off) / independent * (inverse @ inverse.T), dof

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.spec.student import widening
+
 FloatArray = NDArray[np.float64]
 
 HUBER_TUNING = 1.345  # 95 % efficiency on Gaussian residuals (Huber 1981)
@@ -23,12 +25,12 @@ class LineFit:
 
     centre: FloatArray
     direction: FloatArray
-    u_direction_rad: float  # standard uncertainty of the direction from the residuals
+    u_direction_rad: float  # of the direction from the residuals; 1.96 of it are a 95 % interval
     rms_px: float  # weighted scatter of the points across the line
     offsets_px: FloatArray  # (n,) signed distance of every point from the line
 
 
-def fit_line(points: FloatArray, weights: FloatArray) -> LineFit:
+def fit_line(points: FloatArray, weights: FloatArray, least_correlation: float = 0.0) -> LineFit:
     """Robust total least squares line through ordered points (n, 2).
 
     Huber weights come close to the line from anywhere, Tukey's bisquare then drops what is not
@@ -36,7 +38,9 @@ def fit_line(points: FloatArray, weights: FloatArray) -> LineFit:
 
     `weights` (n,) are relative prior weights. Neighbouring edge points are correlated by the
     lens, the sensor and JPEG blocks, so the number of independent points is smaller than n: see
-    `independent_share`. Needs n >= 3.
+    `independent_share`. Few residuals tell little of that, so they are held to be correlated by
+    `least_correlation` at least; at the degrees of freedom which that alone leaves, 1.96 times the
+    uncertainty is Student's 95 % interval. Needs n >= 3.
     """
     robust = weights.astype(np.float64).copy()
     centre, direction, offsets = plain_line(points, robust)
@@ -51,15 +55,17 @@ def fit_line(points: FloatArray, weights: FloatArray) -> LineFit:
         centre, direction, offsets = plain_line(points, robust)
     along = (points - centre) @ direction
     total = float(robust.sum())
-    variance = float((robust * offsets**2).sum()) / total * len(points) / max(len(points) - 2, 1)
+    scatter = float((robust * offsets**2).sum()) / total
     spread = float((robust * along**2).sum()) / total
-    independent = len(points) * independent_share(offsets)
-    u_direction = np.sqrt(variance / max(spread, 1e-12) / independent)
+    correlation = max(lag_one_correlation(offsets), least_correlation)
+    dof = _degrees_of_freedom(len(points), correlation)
+    wider = widening(_degrees_of_freedom(len(points), least_correlation))
+    u_direction = wider * np.sqrt(scatter / max(spread, 1e-12) / dof)
     return LineFit(
         centre=centre,
         direction=direction,
         u_direction_rad=float(u_direction),
-        rms_px=float(np.sqrt(variance)),
+        rms_px=float(np.sqrt(scatter * len(points) / max(len(points) - 2, 1))),
         offsets_px=offsets,
     )
 
@@ -90,14 +96,22 @@ def median(values: NDArray[Any]) -> float:
     return float(np.partition(values, middle)[middle])
 
 
-def independent_share(offsets: FloatArray) -> float:
-    """Share (1 - r) / (1 + r) of correlated residuals (n,) that count as independent.
-
-    The effective sample size of an AR(1) process with the lag-one correlation r, which is taken
-    to be between 0 and 0.95.
-    """
+def lag_one_correlation(offsets: FloatArray) -> float:
+    """Of neighbouring residuals (n,) about a fit, taken to be between 0 and 0.95."""
     energy = float(offsets @ offsets)
     if energy <= 0.0:
-        return 1.0
-    lag_one = min(max(float(offsets[1:] @ offsets[:-1]) / energy, 0.0), 0.95)
-    return (1.0 - lag_one) / (1.0 + lag_one)
+        return 0.0
+    return min(max(float(offsets[1:] @ offsets[:-1]) / energy, 0.0), 0.95)
+
+
+def independent_share(correlation: float) -> float:
+    """Share (1 - r) / (1 + r) of residuals that count as independent.
+
+    The effective sample size of an AR(1) process with the lag-one correlation r.
+    """
+    return (1.0 - correlation) / (1.0 + correlation)
+
+
+def _degrees_of_freedom(count: int, correlation: float) -> float:
+    """What a line leaves of points that are correlated; one at least."""
+    return max(count * independent_share(correlation) - 2.0, 1.0)

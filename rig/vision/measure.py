@@ -81,6 +81,8 @@ class Limits:
     contradict each other."""
     max_u_deg: float = 3.0
     """Standard uncertainty above which an angle is no measurement."""
+    max_rectified_u_deg: float = 1.0
+    """The same where a ruler gives the plane of the picture: more can be asked there."""
     max_position_gap_deg: float = 65.0
     """Largest gap between the angle and twice the swing of the cap: an arc's chord turns by half
     the arc's angle; 90 deg would be as near to the opposite reading."""
@@ -289,7 +291,8 @@ class AngleMeter:
                 + (self.unrectified_u_deg if plane.rectification is None else 0.0) ** 2
             )
         )
-        if u > self.limits.max_u_deg:
+        limits, ruled = self.limits, plane.rectification is not None
+        if u > (limits.max_rectified_u_deg if ruled else limits.max_u_deg):
             raise UnsharpFrameError(f"the angle would be uncertain by {u:.1f} deg")
         return float(angle), u
 

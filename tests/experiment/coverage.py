@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binom
 
-from rig.board.virtual import VirtualBench
 from rig.board.virtual_calibration import VirtualCalibrationBench
 from rig.experiment.evaluate import Visit, angle_point, force_point
 from rig.experiment.measure import read_angle
@@ -28,6 +27,7 @@ from rig.experiment.prepare import (
 from rig.experiment.sweep import cell_readings, go_to, pressures_kpa, settle
 from rig.link.client import Message, RigLink
 from rig.link.schema import load_schema
+from rig.plant.camera import VirtualCamera
 from rig.record.documents import PointKey
 from rig.report.levels import component_of
 from rig.spec.bench import BenchSpec
@@ -37,7 +37,7 @@ from rig.spec.workspace import Workspace
 from rig.validate.uncertainty import Estimate, combine
 from rig.vision.measure import AngleMeter
 
-from .conftest import ROOT, make_request
+from .conftest import ROOT
 
 DRIFT_S = 15.0
 OLD_ZERO_S = 30.0
@@ -47,6 +47,7 @@ POLL_S = 0.02
 FRAMES = 3
 KEY = PointKey(experiment="blocked_force", repeat=1, direction="up", target_kpa=0.0)
 SPACE = Workspace(ROOT)
+GEOMETRY = SPACE.actuator("bellow-bending").geometry
 CALIBRATIONS = SPACE.resolve_bench(SPACE.bench("virtual-beam"))
 
 
@@ -156,16 +157,21 @@ def _visit(link: RigLink, indicated_kpa: NDArray[np.float64]) -> Visit:
 
 
 def angle_coverage(seeds: range) -> Coverage:
-    """By rendered pictures: seconds for a few, so as many as are affordable."""
+    """By rendered pictures."""
     return _coverage([pair for seed in seeds if (pair := _measured_angle(seed)) is not None])
 
 
 def _measured_angle(seed: int) -> tuple[Estimate, float] | None:
     """An angle in degrees from a camera, ruler and background of this seed; None if rejected."""
     angle_deg = float(np.random.default_rng((seed, 3)).uniform(0.0, 110.0))
-    request = make_request(seed=seed)
-    bench = VirtualBench(request.setup, seed)
-    camera = bench.camera._camera
+    assert BENCH.virtual is not None
+    camera = VirtualCamera(
+        BENCH.virtual.optics,
+        CALIBRATIONS.ruler,
+        GEOMETRY,
+        BENCH.camera.jpeg_quality,
+        np.random.default_rng((seed, 4)),
+    )
     meter = AngleMeter(CALIBRATIONS.camera, CALIBRATIONS.ruler)
     frames = [
         read_angle(meter, camera.grab(np.radians(angle_deg), 0.1 * frame), KEY, frame)

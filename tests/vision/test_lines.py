@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rig.vision.edges import straight_runs
+from rig.vision.edges import LEAST_CORRELATION, straight_runs
 from rig.vision.lines import fit_line
 
 
@@ -46,6 +46,20 @@ def test_the_stated_direction_uncertainty_is_the_scatter_of_the_direction():
     ]
     scatter = np.std([np.radians(misses(fit, np.degrees(0.5))) for fit in fits])
     assert np.mean([fit.u_direction_rad for fit in fits]) == pytest.approx(scatter, rel=0.25)
+
+
+@pytest.mark.parametrize(("correlation", "most"), [(0.0, 1.0), (0.6, 0.99)])
+def test_the_interval_of_a_short_line_holds_its_direction(correlation, most):
+    """As many points as a cap of 30 px has, which resemble each other as those of edges may."""
+    rng, held, trials = np.random.default_rng(4), 0, 800
+    for _ in range(trials):
+        noise = rng.normal(0.0, 0.2, 26)
+        for i in range(1, 26):
+            noise[i] = correlation * noise[i - 1] + np.sqrt(1 - correlation**2) * noise[i]
+        points = np.stack([np.arange(26.0), noise], axis=1)
+        fit = fit_line(points, np.ones(26), LEAST_CORRELATION)
+        held += abs(np.radians(misses(fit, 0.0))) < 1.96 * fit.u_direction_rad
+    assert 0.93 < held / trials <= most
 
 
 def test_correlated_scatter_claims_a_larger_uncertainty():
