@@ -20,7 +20,7 @@ def latency(
     cycles: Annotated[int, typer.Option(min=1, help="Swings at each of both rates.")] = 3,
     frames: Annotated[int, typer.Option(min=6, help="On each way of a swing.")] = 20,
     lag_ms: Annotated[
-        float, typer.Option(min=0, help="By which the angle follows the pressure late.")
+        float, typer.Option(min=0, help="By which damping lets the actuator follow late.")
     ] = 20.0,
     lag_u_ms: Annotated[
         float, typer.Option(min=0, help="Its standard uncertainty; as it stands: 0 to 40 ms.")
@@ -30,9 +30,10 @@ def latency(
 ) -> None:
     """Find how long after its exposure a frame of the bench's camera arrives.
 
-    The actuator swings slowly and fast; angles are laid over pressures. How late the actuator
-    itself follows looks like latency and is not measured: say it if you know it better, as from a
-    film at a high frame rate. The result is the bench's camera calibration with the latency in it;
+    The actuator swings slowly and fast; angles are laid over pressures. How late the tube lets it
+    follow is worked out from what the plunger pushes. How late its damping does looks like latency
+    and is not measured: 2 zeta / omega, say it if you know it better, as from a film of it swinging
+    out. The result is the bench's camera calibration with the latency in it;
     a new lens calibration needs its latency anew.
 
     Examples:
@@ -45,7 +46,7 @@ def latency(
 
     from rich.console import Console
 
-    from rig.calibrate.latency import Follower, Swing, fit_latency
+    from rig.calibrate.latency import CREEP, TRANSDUCER, Lag, Swing, fit_latency, tube_lag
     from rig.cli._calibration_file import finish, provenance, surroundings
     from rig.cli._interruption import catching_signals
     from rig.cli._session import new_session
@@ -82,7 +83,12 @@ def latency(
             )
     finally:
         opened.close()
-    fit = fit_latency(swings[0], Follower(lag_ms / 1e3, lag_u_ms / 1e3))
+    drive = known.syringe
+    dead_volume = spec.syringe.dead_volume if drive is None else drive.dead_volume
+    damping = Lag("damping", lag_ms / 1e3, lag_u_ms / 1e3)
+    lags = (damping, tube_lag(swings[0], spec, dead_volume), TRANSDUCER, CREEP)
+    fit = fit_latency(swings[0], lags)
+    budget = [f"{lag.cause} {1e3 * lag.value_s:.1f} ms, u = {1e3 * lag.u_s:.1f} ms" for lag in lags]
     found = fit.latency(
         provenance(
             method=f"actuator {setup.actuator.name} swung between {plan.low_kpa:.3g} and "
@@ -92,15 +98,14 @@ def latency(
             operator=operator,
             valid_days=None,
             environment=surroundings(spec, spec.simulated),
-            reference="pressure transducer of the bench; the actuator follows it by "
-            f"{lag_ms:g} ms, u = {lag_u_ms:g} ms",
+            reference=f"pressure transducer of the bench; angles follow it by: {'; '.join(budget)}",
             simulated=spec.simulated,
         )
     )
     console.print(
         f"delay of angle behind pressure {1e3 * fit.fit['delay']:.1f} ms, "
-        f"u = {1e3 * fit.fit.u({'delay': 1.0}):.1f} ms; less {lag_ms:g} ms of the actuator's own, "
-        f"u = {lag_u_ms:g} ms",
+        f"u = {1e3 * fit.fit.u({'delay': 1.0}):.1f} ms; less",
+        *(f"  {line}" for line in budget),
         f"latency {1e3 * found.value:.1f} ms, u = {1e3 * found.u:.1f} ms",
         sep="\n",
         highlight=False,

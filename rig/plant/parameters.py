@@ -19,10 +19,8 @@ from rig.spec.bench import (
 from rig.spec.physics import Liquid
 from rig.spec.quantity import STANDARD_GRAVITY
 
-AIR_VISCOSITY = 1.82e-5
-"""Pa s at 20 degC (CRC Handbook of Chemistry and Physics)."""
 AIR_MOLAR_MASS = 28.96e-3
-"""kg/mol of dry air (the same)."""
+"""kg/mol of dry air (CRC Handbook of Chemistry and Physics)."""
 GAS_CONSTANT = 8.314462618
 REFERENCE_LEAK_PRESSURE = 10e3
 """Gauge pressure in Pa at which a bench spec states its leak."""
@@ -36,7 +34,6 @@ def fluid_parameters(bench: BenchSpec, pneumatics: VirtualPneumatics) -> dict[st
     """What fills the bench, and all that it flows through."""
     tube, ambient = bench.tubing, bench.ambient
     liquid = bench.fluid if isinstance(bench.fluid, Liquid) else None
-    viscosity = liquid.viscosity if liquid else AIR_VISCOSITY
     area = np.pi * tube.inner_diameter**2 / 4
     return {
         "ambient_pressure": ambient.pressure,
@@ -44,7 +41,7 @@ def fluid_parameters(bench: BenchSpec, pneumatics: VirtualPneumatics) -> dict[st
         "liquid": liquid is not None,
         "molar_mass": AIR_MOLAR_MASS,
         "density": _fluid_density(bench),
-        "viscosity": viscosity,
+        "viscosity": bench.fluid.viscosity,
         "bulk_modulus": liquid.bulk_modulus if liquid else 0.0,
         "entrained_air": liquid.entrained_air if liquid else 0.0,
         "solubility": liquid.solubility if liquid else 0.0,
@@ -53,8 +50,7 @@ def fluid_parameters(bench: BenchSpec, pneumatics: VirtualPneumatics) -> dict[st
         "tube_volume": tube.volume,
         "tube_area": area,
         "tube_diameter": tube.inner_diameter,
-        # Hagen and Poiseuille
-        "tube_resistance": 128 * viscosity * tube.length / (np.pi * tube.inner_diameter**4),
+        "tube_resistance": tube.resistance(bench.fluid.viscosity),
         "minor_loss": pneumatics.minor_loss,
         "tube_length_over_area": tube.length / area if pneumatics.inertia else 0.0,
         "turbulence": pneumatics.turbulence,

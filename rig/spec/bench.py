@@ -100,6 +100,10 @@ class Tubing(SpecModel):
         """Volume of gas in the tube in m3."""
         return math.pi * self.inner_diameter**2 / 4 * self.length
 
+    def resistance(self, viscosity: float) -> float:
+        """Pressure over flow, Pa s/m3, of a fluid that flows slowly (Hagen and Poiseuille)."""
+        return 128 * viscosity * self.length / (math.pi * self.inner_diameter**4)
+
 
 class Transducer(SpecModel):
     """The pressure sensor as its data sheet describes it."""

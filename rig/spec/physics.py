@@ -23,11 +23,19 @@ from rig.spec.quantity import (
     ViscousFriction,
 )
 
+AIR_VISCOSITY = 1.82e-5
+"""Pa s at 20 degC (CRC Handbook of Chemistry and Physics)."""
+
 
 class Air(SpecModel):
     """The bench is full of air."""
 
     kind: Literal["air"] = Field("air", description="which fluid this is")
+
+    @property
+    def viscosity(self) -> float:
+        """Pa s."""
+        return AIR_VISCOSITY
 
 
 class Liquid(SpecModel):

@@ -7,7 +7,15 @@ from dataclasses import dataclass, replace
 import pytest
 
 from rig.board.virtual import VirtualBench
-from rig.calibrate.latency import Follower, LatencyFit, Swing, fit_latency
+from rig.calibrate.latency import (
+    CREEP,
+    TRANSDUCER,
+    Lag,
+    LatencyFit,
+    Swing,
+    fit_latency,
+    tube_lag,
+)
 from rig.experiment.calibration.latency import SwingPlan, swing_actuator
 from rig.experiment.calibration.session import calibrate_on
 from rig.link.client import RigLink
@@ -16,7 +24,7 @@ from rig.vision.measure import AngleMeter
 from .conftest import make_request
 
 SEEDS = (1, 2, 3)
-KNOWN = Follower(0.020, 0.012)
+DAMPING_U_S = 0.012
 """As the command assumes unless told."""
 PLAN = SwingPlan.below(12.0, cycles=1, frames=8)
 
@@ -43,7 +51,13 @@ def found(seed: int) -> Found:
         swings.append(swing_actuator(bench, link, meter, PLAN, known_s, lambda _: None))
 
     calibrate_on(bench, request.board_parameters(), swung, lambda _: None)
-    return Found(bench.camera.latency_s, fit_latency(swings[0], KNOWN))
+    spec = setup.bench
+    assert spec.virtual is not None
+    # the command's default, too
+    damping = Lag("damping", spec.virtual.specimen.response_time, DAMPING_U_S)
+    tube = tube_lag(swings[0], spec, spec.syringe.dead_volume)
+    lags = (damping, tube, TRANSDUCER, CREEP)
+    return Found(bench.camera.latency_s, fit_latency(swings[0], lags))
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +69,14 @@ def test_the_hidden_latency_is_found_within_its_uncertainty(cameras: list[Found]
     for camera in cameras:
         assert abs(camera.fit.value_s - camera.hidden_s) < 2 * camera.fit.u_s
         assert camera.fit.u_s < 0.015
+
+
+def test_what_is_not_damping_is_known_to_milliseconds(cameras: list[Found]) -> None:
+    """Tube, filter and creep: the damping is the bench's own here, so its uncertainty is none."""
+    for camera in cameras:
+        u_s = (camera.fit.u_s**2 - DAMPING_U_S**2) ** 0.5
+        assert u_s < 0.004
+        assert abs(camera.fit.value_s - camera.hidden_s) < 1.5 * u_s
 
 
 def test_cameras_differ_by_what_they_hide(cameras: list[Found]) -> None:

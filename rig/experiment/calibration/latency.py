@@ -90,6 +90,9 @@ def _measured(
             f"the last other one: {reason}. Check light, focus and view."
         )
     frame_s, angle_deg = np.array(seen, dtype=np.float64).T
-    heard = [(m.time_s, m.values["pressure_kpa"]) for m in messages if m.name == "PRESSURE"]
-    pressure_s, pressure_kpa = np.array(heard, dtype=np.float64).T
-    return Swing(frame_s, angle_deg, pressure_s, pressure_kpa)
+    heard = [
+        (m.time_s, m.values["pressure_kpa"], m.values["plunger_ml"])
+        for m in messages
+        if m.name == "PRESSURE"
+    ]
+    return Swing(frame_s, angle_deg, *np.array(heard, dtype=np.float64).T)
