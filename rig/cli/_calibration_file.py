@@ -62,8 +62,9 @@ def finish(
     """Write the calibration and say how runs come to use it; `field` of the bench names it."""
     path = out or free_path(folder(workspace), calibration, calibration.instrument)
     write_calibration(calibration, path)
+    until = calibration.provenance.valid_until
     console.print(
-        f"Written: {path}, valid until {calibration.provenance.valid_until}. Runs use it once the "
+        f"Written: {path}{'' if until is None else f', valid until {until}'}. Runs use it once the "
         f"bench names it: {field}: {path.stem}",
         soft_wrap=True,
         highlight=False,
