@@ -13,6 +13,7 @@ from rig.vision.backbone import fit_backbone
 from rig.vision.displacement import DisplacementTracker
 from rig.vision.errors import UntrustedFrameError
 from rig.vision.footage import Frame
+from rig.vision.marker_angle import MarkerAngleMeter
 from rig.vision.measure import AngleMeasurement, AngleMeter
 from rig.vision.overlay import draw_overlay
 from rig.vision.segment import Image
@@ -63,26 +64,43 @@ class AngleGauge:
     def film(self) -> Read:
         """Stills are measured one by one, even where films are followed."""
         if not self.track:
-            return lambda frame: self._reading(frame, self.meter.measure(frame.image))
+            return lambda frame: self._read(frame, self.meter.measure(frame.image))
         from rig.vision.track import AngleTracker  # imports slowly
 
         tracker = AngleTracker(self.meter)
 
         def read(frame: Frame) -> Reading:
             if frame.time_s is None:
-                return self._reading(frame, self.meter.measure(frame.image))
-            return self._reading(frame, tracker.measure(frame.image, frame.time_s).measurement)
+                return self._read(frame, self.meter.measure(frame.image))
+            return self._read(frame, tracker.measure(frame.image, frame.time_s).measurement)
 
         return read
 
-    def _reading(self, frame: Frame, found: AngleMeasurement) -> Reading:
-        u95 = COVERAGE_FACTOR * found.u_deg if found.accepted else None
-        return Reading(
-            (found.angle_deg, u95, found.quality),
-            found.accepted,
-            found.reason,
-            overlay=draw_overlay(frame.image, found) if self.overlay else None,
-        )
+    def _read(self, frame: Frame, found: AngleMeasurement) -> Reading:
+        return _angle_reading(frame, found, self.overlay)
+
+
+@dataclass(frozen=True)
+class MarkerAngleGauge:
+    """The bending angle between two markers."""
+
+    meter: MarkerAngleMeter
+    overlay: bool
+    columns: tuple[Column, ...] = ANGLE
+
+    def film(self) -> Read:
+        """No frame needs another one."""
+        return lambda frame: _angle_reading(frame, self.meter.measure(frame.image), self.overlay)
+
+
+def _angle_reading(frame: Frame, found: AngleMeasurement, overlay: bool) -> Reading:
+    u95 = COVERAGE_FACTOR * found.u_deg if found.accepted else None
+    return Reading(
+        (found.angle_deg, u95, found.quality),
+        found.accepted,
+        found.reason,
+        overlay=draw_overlay(frame.image, found) if overlay else None,
+    )
 
 
 @dataclass(frozen=True)

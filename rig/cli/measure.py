@@ -38,6 +38,7 @@ class Quantity(StrEnum):
     """What is measured."""
 
     ANGLE = "angle"
+    MARKER_ANGLE = "marker-angle"
     DISPLACEMENT = "displacement"
     BACKBONE = "backbone"
 
@@ -76,6 +77,9 @@ def measure(
         tuple[int, int],
         typer.Option(min=0, max=49, help="ArUco 4X4_50 markers: at the fixed end, at the moving"),
     ] = (0, 1),
+    mounting_u_deg: Annotated[
+        float, typer.Option(min=0, help="of markers from parallel when straight, u in deg")
+    ] = 0.5,
     out_of_plane_u_mm: Annotated[
         float,
         typer.Option(min=0, help="of markers or backbone from the ruler's plane, u in mm"),
@@ -86,6 +90,8 @@ def measure(
     The actuator hangs from a blue connector and ends in a blue cap. The angle is 0 for a straight
     actuator and grows with bending; u95 is its expanded uncertainty. A frame that cannot be
     trusted is listed as rejected, with the reason.
+
+    Where connector and cap are not blue, they can wear markers: --quantity marker-angle.
 
     Displacement is that of one marker from another since the first frame, of a video or of all
     images. It and the backbone need --camera and --ruler, and the ruler in the frame.
@@ -103,13 +109,19 @@ def measure(
     from rig.vision.table import header
 
     files = expand(footage)
+    angle = quantity in (Quantity.ANGLE, Quantity.MARKER_ANGLE)
+    if angle and budget is not None:
+        raise typer.BadParameter("the report of a run has the budget of its angles")
     if quantity is Quantity.ANGLE:
-        if budget is not None:
-            raise typer.BadParameter("the report of a run has the budget of its angles")
         gauge = _angle(_meter(camera, ruler, bends), track, overlay is not None)
+    elif track:
+        raise typer.BadParameter("--track is for the angle")
+    elif quantity is Quantity.MARKER_ANGLE:
+        meter = _meter(camera, ruler, bends)
+        gauge = _marker_angle(meter, markers, mounting_u_deg, overlay is not None)
     else:
-        if track or overlay is not None:
-            raise typer.BadParameter("--track and --overlay are for the angle")
+        if overlay is not None:
+            raise typer.BadParameter("--overlay is for the angle")
         gauge = _length(quantity, _meter(camera, ruler, bends), markers, out_of_plane_u_mm)
     if overlay is not None:
         _make_folder(overlay)
@@ -119,7 +131,7 @@ def measure(
         rows.append(row)
         readings.append(reading)
     _show(rows, gauge.columns)
-    if quantity is not Quantity.ANGLE:
+    if not angle:
         _show_budget(rows, readings)
     if csv is not None:
         write_csv(csv, header(gauge.columns), [row.cells(gauge.columns) for row in rows])
@@ -154,6 +166,24 @@ def _angle(meter: AngleMeter, track: bool, overlay: bool) -> Gauge:
     return AngleGauge(meter, track, overlay)
 
 
+def _marker_angle(
+    meter: AngleMeter, markers: tuple[int, int], mounting_u_deg: float, overlay: bool
+) -> Gauge:
+    from rig.cli._gauges import MarkerAngleGauge
+    from rig.vision.marker_angle import MarkerAngleMeter
+
+    _require_two(markers)
+    between = MarkerAngleMeter(
+        meter.camera, meter.ruler, meter.bends, *markers, mounting_u_deg=mounting_u_deg
+    )
+    return MarkerAngleGauge(between, overlay)
+
+
+def _require_two(markers: tuple[int, int]) -> None:
+    if markers[0] == markers[1]:
+        raise typer.BadParameter(f"--markers are two, got {markers[0]} twice")
+
+
 def _length(
     quantity: Quantity, meter: AngleMeter, markers: tuple[int, int], out_of_plane_u_mm: float
 ) -> Gauge:
@@ -167,8 +197,7 @@ def _length(
     picturing = Picturing(meter.camera, meter.ruler, out_of_plane_u_mm)
     if quantity is Quantity.BACKBONE:
         return BackboneGauge(meter, picturing)
-    if markers[0] == markers[1]:
-        raise typer.BadParameter(f"--markers are two, got {markers[0]} twice")
+    _require_two(markers)
     return DisplacementGauge(picturing, *markers)
 
 

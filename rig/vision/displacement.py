@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from rig.spec.calibration import CameraCalibration, RulerCalibration
 from rig.vision.errors import UntrustedFrameError
 from rig.vision.lines import FloatArray
+from rig.vision.markers import find_markers
 from rig.vision.motion import ConstantVelocity, require_later
 from rig.vision.parts import SMALL_RAD, SeenParts, sheared
 from rig.vision.plane import PicturePlane, rectify, require_picture
@@ -119,11 +119,11 @@ class DisplacementTracker:
             side = self._track.side_px
             reach = side * (0.5 + MARGIN_SIDES)
             moved = GATE_SIGMAS * float(expected.u.max())
-            found |= _markers(image, self._zero.places_px[0], reach)
-            found |= _markers(image, expected.values, reach + moved)
+            found |= find_markers(image, self._zero.places_px[0], reach)
+            found |= find_markers(image, expected.values, reach + moved)
         if any(name not in found for name in self._names):
             everywhere = 0.5 * np.array(image.shape[1::-1]), float(max(image.shape))
-            found = _markers(image, *everywhere) | found
+            found = find_markers(image, *everywhere) | found
         missing = [str(name) for name in self._names if name not in found]
         if missing:
             raise UntrustedFrameError(f"marker {' and '.join(missing)} not found: hidden, blurred?")
@@ -203,30 +203,6 @@ def _require_near(moving: FloatArray, expected: ConstantVelocity) -> None:
             f"the moving marker jumps to {apart:.0f} px from where it is expected, give or take "
             f"{allowed:.0f} px"
         )
-
-
-def _markers(image: Image, middle: FloatArray, reach: float) -> dict[int, FloatArray]:
-    """Corners (4, 2) px by name of the markers in a window about `middle` (2,)."""
-    high_limit = np.array(image.shape[1::-1])
-    low = np.floor(middle - reach).astype(int).clip(0, high_limit)
-    high = np.ceil(middle + reach).astype(int).clip(0, high_limit)
-    window = image[low[1] : high[1], low[0] : high[0]]
-    if min(window.shape[:2]) < 8:
-        return {}
-    parameters = cv2.aruco.DetectorParameters()
-    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
-    # cells of a few pixels: their rims, blurred, tell nothing of their colour
-    parameters.perspectiveRemoveIgnoredMarginPerCell = 0.3
-    parameters.adaptiveThreshWinSizeMax = 53
-    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
-    detector = cv2.aruco.ArucoDetector(dictionary, parameters)
-    corners, names, _ = detector.detectMarkers(cv2.cvtColor(window, cv2.COLOR_BGR2GRAY))
-    if names is None:
-        return {}
-    return {
-        int(name): four.reshape(4, 2).astype(np.float64) + low
-        for name, four in zip(names.ravel(), corners, strict=True)
-    }
 
 
 def _misfit(plane: PicturePlane, corners: Sequence[FloatArray]) -> float:

@@ -40,7 +40,7 @@ MIN_POINTS = 8
 MASK_SAMPLES = 15  # points of an edge at which the part's mask is looked at
 PIXEL_FLOOR_PX = 0.03  # end-to-end error left by sampling and JPEG, seen on synthetic edges
 LEAST_CORRELATION = 0.6  # of points a pixel apart, which blur and colour at half resolution join
-END_WIDTHS = 0.6
+END_WIDTHS = 0.8
 """At its ends an edge is rounded and has other surroundings: an error that does not grow with its
 length. A stretch as long as the edge is wide, displaced at one end, turns it by so many widths over
 the square of its length; seen on rendered edges of 20 to 60 px."""

@@ -121,13 +121,13 @@ def test_after_the_first_frame_only_the_markers_surroundings_are_searched(
     picture, tracker, monkeypatch
 ):
     whole = []
-    seek = displacement._markers
+    seek = displacement.find_markers
 
     def counted(image, middle, reach):
         whole.append(reach >= max(image.shape))
         return seek(image, middle, reach)
 
-    monkeypatch.setattr(displacement, "_markers", counted)
+    monkeypatch.setattr(displacement, "find_markers", counted)
     for time in np.arange(6) / 120:
         assert tracker.measure(picture(time), float(time)).accepted
     assert whole[0]

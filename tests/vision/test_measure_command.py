@@ -17,6 +17,7 @@ from rig.vision.table import ANGLE, header
 from tests.cli.conftest import rig  # noqa: F401
 from tests.vision.synthetic import Scene, render
 from tests.vision.test_displacement import CAMERA, film_of, still_outlines, stroke_mm
+from tests.vision.test_marker_angle import picture as markers_at
 from tests.vision.test_track import camera, frame
 
 CALIBRATIONS = (
@@ -311,3 +312,16 @@ def test_a_file_whose_name_looks_like_a_glob_is_found(tmp_path, pictures):
     path = tmp_path / "take[1].png"
     cv2.imwrite(str(path), pictures[10.0])
     assert expand([str(path)]) == [path]
+
+
+def test_the_angle_between_markers_is_a_row_and_an_overlay(rig, tmp_path):  # noqa: F811
+    cv2.imwrite(str(tmp_path / "m.png"), markers_at(50.0))
+    table, drawn = tmp_path / "m.csv", tmp_path / "o"
+    wanted = ("--quantity", "marker-angle", "--csv", table, "--overlay", drawn)
+    outcome = rig("measure", tmp_path / "m.png", *wanted)
+    assert outcome.code == 0, outcome.err
+    (row,) = csv.DictReader(table.open(newline=""))
+    assert abs(float(row["angle_deg"]) - 50.0) < float(row["u95_deg"])
+    assert (drawn / "m.png").exists()
+    assert rig("measure", tmp_path / "m.png", *wanted, "--markers", 1, 1).code != 0
+    assert rig("measure", tmp_path / "m.png", *wanted, "--track").code != 0
