@@ -70,6 +70,8 @@ _PREDICTORS: dict[tuple[str, str], Predictor] = {
     ("bellow-rectangular", "fe"): finite_elements,
     ("multi-chamber-bending", "fe"): finite_elements,
     ("multi-chamber-linear", "fe"): finite_elements,
+    ("shell-reinforced-bending", "fe"): finite_elements,
+    ("shell-reinforced-linear", "fe"): finite_elements,
 }
 
 

@@ -10,8 +10,10 @@ from rig.mechanics.bellow import BellowShape
 from rig.mechanics.chambers import ChamberRow
 from rig.mechanics.errors import MechanicsError
 from rig.mechanics.response import SideProfile
+from rig.mechanics.shells import SlitShell
 from rig.spec.actuator import BellowBendingGeometry, Geometry
 from rig.spec.chambers import BellowRectangularGeometry, MultiChamberBendingGeometry
+from rig.spec.shells import ShellReinforcedBendingGeometry
 
 Array = NDArray[np.float64]
 
@@ -35,18 +37,26 @@ def side_profile(geometry: Geometry, angle: float) -> SideProfile:
         case BellowBendingGeometry():
             return profile.side_profile(geometry, angle)
         case BellowRectangularGeometry() | MultiChamberBendingGeometry():
-            return _row_profile(ChamberRow.of(geometry), angle)
+            row = ChamberRow.of(geometry)
+            return _profile(row, angle, _floor_of(row), _roof_of(row))
+        case ShellReinforcedBendingGeometry():
+            tube = SlitShell.of(geometry)
+            along = np.array([tube.start, tube.start, tube.end, tube.end])
+            roof = np.column_stack((along, tube.height * np.array([0, 1, 1, 0])))
+            return _profile(tube, angle, tube.radius - tube.chamber_radius, roof)
         case _:
             raise _does_not_bend(geometry)
 
 
-def bending_shape(geometry: Geometry) -> BellowShape | ChamberRow:
+def bending_shape(geometry: Geometry) -> BellowShape | ChamberRow | SlitShell:
     """Dimensions, volumes and masses; raises MechanicsError for a family that does not bend."""
     match geometry:
         case BellowBendingGeometry():
             return BellowShape.of(geometry)
         case BellowRectangularGeometry() | MultiChamberBendingGeometry():
             return ChamberRow.of(geometry)
+        case ShellReinforcedBendingGeometry():
+            return SlitShell.of(geometry)
         case _:
             raise _does_not_bend(geometry)
 
@@ -58,16 +68,24 @@ def _does_not_bend(geometry: Geometry) -> MechanicsError:
     )
 
 
-def _row_profile(row: ChamberRow, angle: float) -> SideProfile:
-    """A row of chambers bent to an arc about its underside, sections plane."""
-    floor = row.layer or min(s.cavity.low for s in row.segments if s.cavity) - row.underside
-    near, top = row.start, row.height
-    steps = [np.array([near, 0.0])]
+def _floor_of(row: ChamberRow) -> float:
+    """Height of what lies below the chambers, m."""
+    return row.layer or min(s.cavity.low for s in row.segments if s.cavity) - row.underside
+
+
+def _roof_of(row: ChamberRow) -> Array:
+    """The upper outline as (x, height over the underside), from the floor and back to it, m."""
+    steps = [np.array([row.start, 0.0])]
     for x, segment in zip(row.starts(), row.segments, strict=False):
         height = segment.outline.high - row.underside
         steps += [np.array([x, height]), np.array([x + segment.length, height])]
     steps.append(np.array([row.end, 0.0]))
-    upper = np.stack(steps)
+    return np.stack(steps)
+
+
+def _profile(row: ChamberRow | SlitShell, angle: float, floor: float, upper: Array) -> SideProfile:
+    """An actuator bent to an arc about its underside, sections plane."""
+    near, top = row.start, row.height
     upper[[0, -1], 1] = floor
     return SideProfile(
         connector=np.array(
@@ -88,7 +106,7 @@ def _box(start: float, end: float, height: float) -> Array:
     return np.array([[start, 0.0], [end, 0.0], [end, height], [start, height]])
 
 
-def _bent(row: ChamberRow, angle: float, corners: Array) -> Array:
+def _bent(row: ChamberRow | SlitShell, angle: float, corners: Array) -> Array:
     """A closed outline of (x, height over the underside), its long sides bent with the row."""
     pieces = []
     for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):

@@ -17,6 +17,7 @@ from rig.spec.chambers import (
     MultiChamberLinearGeometry,
 )
 from rig.spec.quantity import Length, Pressure, Ratio
+from rig.spec.shells import ShellReinforcedBendingGeometry, ShellReinforcedLinearGeometry
 
 ModelName = Literal["beam", "fe"]
 
@@ -219,7 +220,9 @@ Geometry = Annotated[
     | BellowGripperGeometry
     | BellowRectangularGeometry
     | MultiChamberBendingGeometry
-    | MultiChamberLinearGeometry,
+    | MultiChamberLinearGeometry
+    | ShellReinforcedBendingGeometry
+    | ShellReinforcedLinearGeometry,
     Field(discriminator="family"),
 ]
 

@@ -6,6 +6,8 @@ inlet lies on the revolving axis and goes on through the connector, which is a p
 the bottom layer and t more on each side, from the underside to t above the end wall.
 
 Rows of chambers: their segments, with an inlet as wide as the narrowest passage.
+
+Slit shells: the core with an inlet through its first solid end, and the shell between the grips.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from rig.mechanics.cad.construct import Arc, Combined, Line, Part, Point, Prism,
 from rig.mechanics.chambers import ChamberRow, Rectangle
 from rig.mechanics.mesh.bellow_axisymmetric import AxisymmetricBellow
 from rig.mechanics.mesh.bellow_joint import JointBellow
+from rig.mechanics.shells import SlitShell
 from rig.spec.actuator import (
     BellowAxisymmetricGeometry,
     BellowBendingGeometry,
@@ -28,6 +31,7 @@ from rig.spec.actuator import (
     BellowJointGeometry,
     Geometry,
 )
+from rig.spec.shells import ShellReinforcedBendingGeometry, ShellReinforcedLinearGeometry
 
 _NO_FLANK = 1e-9
 """Flanks shorter than this are left out, metres."""
@@ -46,6 +50,8 @@ def parts_of(geometry: Geometry) -> tuple[Part, ...]:
             return parts_of(geometry.finger)
         case BellowJointGeometry():
             return (Part("soft", joint_soft_body(JointBellow.of(geometry)), is_soft=True),)
+        case ShellReinforcedBendingGeometry() | ShellReinforcedLinearGeometry():
+            return _shell_parts(SlitShell.of(geometry))
         case _:
             return _chamber_parts(ChamberRow.of(geometry))
 
@@ -118,6 +124,56 @@ def box(section: Rectangle, start: float, end: float) -> Prism:
     """A section swept along x, from start to end in m."""
     y, low, high = section.half_width, section.low, section.high
     return Prism(((-y, low), (y, low), (y, high), (-y, high)), start, end)
+
+
+def _shell_parts(shape: SlitShell) -> tuple[Part, ...]:
+    low, high = shape.start - shape.end_length, shape.end + shape.end_length
+    core = Combined(
+        (_rod(low, high, shape.core_radius),),
+        (
+            _rod(shape.start, shape.end, shape.chamber_radius),
+            _rod(low, shape.start, min(INLET_RADIUS, shape.chamber_radius / 2)),
+        ),
+    )
+    grip = Combined(
+        (_rod(shape.end, shape.tip, shape.radius),),
+        (_rod(shape.end, high, shape.core_radius),),
+    )
+    return (
+        Part("soft", core, is_soft=True),
+        Part("cap", grip, is_soft=False),
+        Part("shell", slit_shell(shape), is_soft=False),
+    )
+
+
+def slit_shell(shape: SlitShell) -> Combined:
+    """The shell: a tube less what its slits cut out between their bridges."""
+    cuts = []
+    for span in shape.spans:
+        # the other half mirrors this one: a cut that starts or ends in the plane crosses it
+        edges = [0.0, *(v for bridge in span.bridges for v in bridge), math.pi]
+        for low, high in zip(edges[::2], edges[1::2], strict=True):
+            if high - low < _NO_FLANK:
+                continue
+            around = [(low, high), (2 * math.pi - high, 2 * math.pi - low)]
+            if high == math.pi:
+                around = [(low, 2 * math.pi - low)]
+            elif low == 0.0:
+                around = [(-high, high)]
+            cuts += [_wedge(a, b, 2 * shape.radius, span.start, span.end) for a, b in around]
+    inside = _rod(shape.start, shape.end, shape.core_radius)
+    return Combined((_rod(shape.start, shape.end, shape.radius),), (inside, *cuts))
+
+
+def _wedge(low: float, high: float, reach: float, start: float, end: float) -> Prism:
+    """What lies between two angles from the lowest line, as far as `reach` from the axis at
+    least."""
+    count = max(2, math.ceil((high - low) / (math.pi / 6)) + 1)
+    rim = [
+        (reach * math.sin(a), -reach * math.cos(a)) for a in np.linspace(low, high, count).tolist()
+    ]
+    # clockwise from below through +y: counter-clockwise in (y, z)
+    return Prism(((0.0, 0.0), *rim), start, end)
 
 
 def axisymmetric_soft_body(shape: AxisymmetricBellow) -> Combined:

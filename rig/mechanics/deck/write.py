@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from rig.mechanics.deck.elements import Elements, Program, elements_of, faces_of
 from rig.mechanics.deck.errors import DeckError
 from rig.mechanics.deck.material import material_law
-from rig.mechanics.fe import Kinematics, Model, RigidBody, Solid
+from rig.mechanics.fe import Discretisation, Kinematics, Model, RigidBody, Solid
 from rig.mechanics.fe.rigid import MOTIONS
+from rig.mechanics.fe.sliding import Sliding
 
 Indices = NDArray[np.int64]
 
@@ -146,8 +147,9 @@ def _lines(
         yield f"*TIME POINTS, NAME={_REPORTED}"
         times = [number / increments for number in range(1, increments + 1)]
         yield from (_row(*times[i : i + 8]) for i in range(0, increments, 8))
-    faces = yield from _surfaces(actuator, elements)
+    faces = yield from _surface("CAVITY", d, elements, d.facets_on("cavity"))
     yield from _material(actuator)
+    yield from _interfaces(actuator.model, elements, program)
     if cap is not None:
         yield _rigid(reference, rotation if calculix else None)
     yield "*BOUNDARY"
@@ -176,18 +178,42 @@ def _lines(
     yield from _output(reported, calculix)
 
 
-def _surfaces(actuator: DeckModel, elements: Elements) -> Generator[str, None, list[int]]:
-    """The cavity's wall as element sets by face and as a surface; returns the faces there are."""
-    d = actuator.model.discretisation
-    owners = faces_of(elements, d.mesh, d.facets_on("cavity"))
+def _surface(
+    name: str, d: Discretisation, elements: Elements, facets: Indices
+) -> Generator[str, None, list[int]]:
+    """Facets as element sets by face and as a surface; returns the faces there are."""
+    owners = faces_of(elements, d.mesh, facets)
     faces = [int(face) + 1 for face in np.unique(owners[:, 1])]
     for face in faces:
-        yield f"*ELSET, ELSET=CAVITY_{face}"
+        yield f"*ELSET, ELSET={name}_{face}"
         yield from _rows(np.sort(owners[owners[:, 1] == face - 1, 0]) + 1)
-    yield "*SURFACE, NAME=CAVITY, TYPE=ELEMENT"
+    yield f"*SURFACE, NAME={name}, TYPE=ELEMENT"
     for face in faces:
-        yield f"CAVITY_{face}, S{face}"
+        yield f"{name}_{face}, S{face}"
     return faces
+
+
+def _interfaces(model: Model, elements: Elements, program: Program) -> Iterator[str]:
+    """Parts that slide on each other, as contact pairs of the same stiffness and friction.
+
+    Either program has its own law of how friction sets in and follows sliding of any size.
+    """
+    for number, interface in enumerate(model.interfaces, start=1):
+        if not isinstance(interface, Sliding):
+            raise DeckError(f"{type(interface).__name__} has no counterpart in a deck.")
+        slave, master, law = (f"{name}_{number}" for name in ("SLAVE", "MASTER", "SLIDING"))
+        yield from _surface(slave, model.discretisation, elements, interface.slave)
+        yield from _surface(master, model.discretisation, elements, interface.master)
+        stiffness = interface.penalty / _MEGAPASCAL / _MM
+        yield f"*SURFACE INTERACTION, NAME={law}"
+        yield "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR"
+        yield f"{stiffness:.9g}"
+        if interface.friction:
+            yield "*FRICTION"
+            stick = f", {stiffness / 10:.9g}" if program is Program.CALCULIX else ""
+            yield f"{interface.friction:.9g}{stick}"
+        yield f"*CONTACT PAIR, INTERACTION={law}, TYPE=SURFACE TO SURFACE"
+        yield f"{slave}, {master}"
 
 
 def _material(actuator: DeckModel) -> Iterator[str]:

@@ -47,7 +47,9 @@ class Facets:
         found = Facets(nodes, d.nodes[nodes], np.ones(len(nodes)), triangular)
         middle = np.full((1, d.dim - 1), 1 / 3 if triangular else 1 / 2)
         at, normals = found.at(np.zeros(d.size), middle)
-        away = at[:, 0] - d.nodes[d.connectivity[elements]].mean(axis=1)
+        # the mean of a thin curved element's nodes may be beyond the facet
+        centre = d.mesh.elem.refdom.p.mean(axis=1, keepdims=True)
+        away = at[:, 0] - d.mesh.mapping().F(centre, tind=elements)[..., 0].T
         outward = np.sign(np.einsum("fi,fi->f", normals[:, 0], away))
         return Facets(nodes, found.places, outward, triangular)
 

@@ -38,6 +38,28 @@ class Item(Protocol):
         ...
 
 
+class Interface(Protocol):
+    """What acts on fixed degrees of freedom and remembers its path, such as friction."""
+
+    dofs: Integers
+    """As an item's."""
+
+    symmetric: bool
+    """Whether its derivative is."""
+
+    def virgin(self, size: int, /) -> Array:
+        """The memory at rest, in a model of `size` degrees of freedom."""
+        ...
+
+    def evaluate(self, x: Array, memory: Array, /) -> tuple[Array, Array]:
+        """Residual and derivative as an item's, with the memory of the last accepted step."""
+        ...
+
+    def settled(self, x: Array, memory: Array, /) -> Array:
+        """The memory after a step to `x` is accepted."""
+        ...
+
+
 @dataclass(frozen=True)
 class Support:
     """Degrees of freedom with prescribed displacements `motion * values` in m."""
@@ -98,6 +120,7 @@ class Model:
         dead_load: Array | None = None,
         bodies: Sequence[RigidBody] = (),
         items: Sequence[Item] = (),
+        interfaces: Sequence[Interface] = (),
         coordinates: Coordinates | None = None,
     ) -> None:
         """`dead_load` in N over all degrees of freedom, as `gravity` and `traction` give it.
@@ -111,6 +134,7 @@ class Model:
         self.surface = surface
         self.bodies = tuple(bodies)
         self.items = tuple(items)
+        self.interfaces = tuple(interfaces)
         self.coordinates: Coordinates = coordinates or Cartesian()
         n = discretisation.size
         self.size = n
@@ -143,6 +167,7 @@ class Model:
         if surface is not None:
             blocks.append(surface.dofs)
         blocks.extend(item.dofs for item in self.items)
+        blocks.extend(interface.dofs for interface in self.interfaces)
         dim = discretisation.dim if discretisation.pressure_nodes == 0 else 1
         self.pattern = Pattern(n, blocks, dim)
         self._free_part = self.pattern.submatrix(self.free)
@@ -157,7 +182,8 @@ class Model:
         """Whether the tangent is symmetric."""
         surface = self.surface
         walls = surface is None or surface.symmetric or not surface.follower
-        return walls and all(item.symmetric for item in self.items)
+        acting = [i.symmetric for i in self.items] + [i.symmetric for i in self.interfaces]
+        return walls and all(acting)
 
     def start(self) -> State:
         """At rest, without loads."""
@@ -165,6 +191,7 @@ class Model:
             x=np.zeros(self.size),
             points=tuple(s.initial() for s in self.solids),
             poses=tuple(Pose() for _ in self.bodies),
+            memories=tuple(i.virgin(self.size) for i in self.interfaces),
         )
 
     def prescribed(self, motion: float) -> Array:
@@ -195,9 +222,13 @@ class Model:
             residual += state.pressure * pressure_slope
             volume = wall.volume
             blocks.append(state.pressure * wall.tangent)
-        for item in self.items:
-            force, stiffness = item.evaluate(x)
-            residual += np.bincount(item.dofs.reshape(-1), weights=force.reshape(-1), minlength=n)
+        acting = [(item.dofs, item.evaluate(x)) for item in self.items]
+        acting += [
+            (interface.dofs, interface.evaluate(x, memory))
+            for interface, memory in zip(self.interfaces, state.memories, strict=True)
+        ]
+        for dofs, (force, stiffness) in acting:
+            residual += np.bincount(dofs.reshape(-1), weights=force.reshape(-1), minlength=n)
             blocks.append(stiffness)
         n_u = self.discretisation.displacement_size
         errors = [e.volume_error for e in evaluations]
@@ -254,9 +285,12 @@ class Model:
         return replace(state, x=self._constrained(x, poses, held), points=points, poses=poses)
 
     def settled(self, state: State) -> State:
-        """The state of a step that is accepted; see `Solid.settled`."""
+        """The state of a step that is accepted; see `Solid.settled` and `Interface.settled`."""
         points = (s.settled(state.x, p) for s, p in zip(self.solids, state.points, strict=True))
-        return replace(state, points=tuple(points))
+        memories = (
+            i.settled(state.x, m) for i, m in zip(self.interfaces, state.memories, strict=True)
+        )
+        return replace(state, points=tuple(points), memories=tuple(memories))
 
     def blended(self, states: Sequence[State], weights: Array, motion: float) -> Placement:
         """Displacements and poses of a weighted sum of states, supports moved by `motion`.

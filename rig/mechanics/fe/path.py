@@ -300,7 +300,8 @@ class _Run:
             replace(parts[-1], pressure=blend(weights, [p.pressure for p in parts]))
             for parts in zip(*(s.points for s in states), strict=True)
         )
-        return State(x, points, poses, pressure, target.dead, target.motion)
+        memories = states[-1].memories
+        return State(x, points, poses, memories, pressure, target.dead, target.motion)
 
     def _with_points(self, state: State, mixed: bool) -> State:
         """The state with strain and stress at its points independent, if they shall be."""

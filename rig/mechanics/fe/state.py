@@ -55,6 +55,8 @@ class State:
     """One for each solid."""
     poses: tuple[Pose, ...] = ()
     """One for each rigid body."""
+    memories: tuple[Array, ...] = ()
+    """What each interface knows of the path up to the last accepted step, in its own terms."""
     pressure: float = 0.0
     """Pressure of the cavity in Pa."""
     dead: float = 0.0

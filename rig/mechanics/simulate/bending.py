@@ -28,7 +28,7 @@ from rig.mechanics.fe import (
     gravity,
 )
 from rig.mechanics.fe.coordinates import Bending
-from rig.mechanics.fe.model import Item
+from rig.mechanics.fe.model import Interface, Item
 from rig.mechanics.hyperelastic import Energy, Volumetric
 from rig.mechanics.mesh.bellow_bending import BendingResolution, mesh_bending_bellow
 from rig.mechanics.simulate.energies import mixed_energies
@@ -151,11 +151,13 @@ def bending_model_on(
     acceleration: tuple[float, float, float] = HANGING,
     cap_density: float | None = None,
     items: Callable[[Discretisation, BendingShape], Sequence[Item]] | None = None,
+    interfaces: Callable[[Discretisation], Sequence[Interface]] | None = None,
     arc: bool = True,
 ) -> BendingModel:
     """The same on a mesh that is there already, where some elements may be of another material.
 
-    `mixed` and `order` as `discretise` takes them.
+    `mixed` and `order` as `discretise` takes them. `interfaces` makes what joins parts of the mesh
+    and remembers its path.
     """
     d = discretise(body.mesh, mixed=mixed, order=order)
     density = material.density.value
@@ -189,6 +191,7 @@ def bending_model_on(
         ),
         bodies=[end],
         items=items(d, shape) if items is not None else (),
+        interfaces=interfaces(d) if interfaces is not None else (),
         coordinates=Bending(d, end, shape.start, shape.end, height=shape.underside)
         if arc
         else None,

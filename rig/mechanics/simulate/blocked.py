@@ -124,7 +124,8 @@ class TipStop:
         cap = d.nodes_on("cap")
         middle = cap[np.abs(d.nodes[cap, 1]) < 1e-9]
         low = middle[np.argmin(d.nodes[middle, 2])]
-        high = middle[np.argmax(d.nodes[middle, 2])]
+        above = middle[np.abs(d.nodes[middle, 0] - d.nodes[low, 0]) < 1e-9]
+        high = above[np.argmax(d.nodes[above, 2])]
         lever = (shape.tip - d.nodes[low, 0]) / (d.nodes[high, 2] - d.nodes[low, 2])
         self.symmetric = True
         self.dofs = np.array([[3 * low, 3 * low + 2, 3 * high]])

@@ -10,6 +10,7 @@ from typing import Any
 from rig.mechanics.fe import Options
 from rig.mechanics.mesh.bellow_bending import BendingResolution
 from rig.mechanics.mesh.chamber_row import RowResolution
+from rig.mechanics.mesh.slit_shell import ShellResolution
 from rig.mechanics.simulate.axisymmetric import axisymmetric_model
 from rig.mechanics.simulate.bending import FREE_OPTIONS, bending_model
 from rig.mechanics.simulate.blocked import BLOCKED_OPTIONS, Blocked
@@ -21,6 +22,7 @@ from rig.mechanics.simulate.chambers import (
 from rig.mechanics.simulate.gripper import finger_model, grip_model
 from rig.mechanics.simulate.inflation import ActuatorModel
 from rig.mechanics.simulate.joint import joint_model
+from rig.mechanics.simulate.shells import shell_bending_model, shell_linear_model
 from rig.spec.material import MaterialSpec
 
 Build = Callable[[Any, MaterialSpec], ActuatorModel]
@@ -69,6 +71,7 @@ _BLOCK = RowResolution(along=3.6e-3, across=3.6e-3)
 """1.5 % of the angle at 12.5 kPa below a mesh of 2.4 mm across, for a fifth of its time."""
 _COARSE_BLOCK = RowResolution(along=3.6e-3, across=3.6e-3, through=1)
 _QUARTER = RowResolution(along=3.6e-3, across=2.4e-3)
+_COARSE_SHELL = ShellResolution(ring=1, slit=1, around=6, wall=1)
 
 FAMILIES: dict[str, Family] = {
     "bellow-axisymmetric": Family(model=Meshing(axisymmetric_model)),
@@ -88,6 +91,13 @@ FAMILIES: dict[str, Family] = {
     ),
     "multi-chamber-linear": Family(
         model=Meshing(partial(multi_chamber_linear_model, resolution=_QUARTER))
+    ),
+    "shell-reinforced-bending": Family(
+        model=_bending(shell_bending_model, ShellResolution()),
+        specimen=_bending(shell_bending_model, _COARSE_SHELL),
+    ),
+    "shell-reinforced-linear": Family(
+        model=Meshing(partial(shell_linear_model, resolution=ShellResolution()))
     ),
 }
 """Families that have a finite element model, by name."""

@@ -24,8 +24,9 @@ Array = NDArray[np.float64]
 RUNGS = 12
 """Rungs up to the actuator's pressure limit."""
 
-_MEASURE, _MODES, _HISTORY = "measure ", "modes ", "history "
-"""How names of arrays in an entry begin, of what is measured and of each solid's points."""
+_MEASURE, _MODES, _HISTORY, _MEMORY = "measure ", "modes ", "history ", "memory "
+"""How names of arrays in an entry begin, of what is measured, of each solid's points and of each
+interface."""
 
 
 class ActuatorModel(Protocol):
@@ -164,6 +165,10 @@ def _entry_of(
             for i, point in enumerate(actuator.model.start().points)
             if point.history is not None
         },
+        **{
+            f"{_MEMORY}{i}": np.array([s.memories[i] for s in states])
+            for i in range(len(actuator.model.interfaces))
+        },
     }
 
 
@@ -188,6 +193,7 @@ def _extremes(entry: Entry) -> tuple[Extremes, ...]:
 
 def _solutions(entry: Entry) -> tuple[Solution, ...]:
     solids = [name.removeprefix(_MODES) for name in sorted(entry) if name.startswith(_MODES)]
+    memories = [name for name in sorted(entry) if name.startswith(_MEMORY)]
     return tuple(
         Solution(
             State(
@@ -205,6 +211,7 @@ def _solutions(entry: Entry) -> tuple[Solution, ...]:
                         *(entry[name][k] for name in ("shift", "rotation", "turn")), strict=True
                     )
                 ),
+                memories=tuple(entry[name][k] for name in memories),
                 pressure=float(entry["pressure"][k]),
                 dead=float(entry["dead"][k]),
                 motion=float(entry["motion"][k]),
