@@ -25,10 +25,10 @@ from rig.spec.workspace import Workspace
 
 COARSE = ShellResolution(ring=1, slit=1, around=6, wall=1)
 BENDING = ShellReinforcedBendingGeometry.model_validate(
-    {"family": "shell-reinforced-bending", "slit_number": 2, "total_length": 16}
+    {"family": "shell-reinforced-bending", "slit_number": 1, "total_length": 12}
 )
 LINEAR = ShellReinforcedLinearGeometry.model_validate(
-    {"family": "shell-reinforced-linear", "slit_number": 3, "total_length": 12}
+    {"family": "shell-reinforced-linear", "slit_number": 1, "total_length": 8}
 )
 
 
