@@ -129,5 +129,5 @@ def test_more_slits_strain_the_shell_less_for_the_same_stroke(ecoflex):
         last = result.solutions[-1]
         found.append((shell_stress(model.model, last), model.measures(last)["displacement"]))
     (few, few_stroke), (many, many_stroke) = found
-    assert many < few
-    assert many / many_stroke < few / few_stroke
+    # at one pressure it is about the same: with 21 slits it lengthens further
+    assert many / many_stroke < 0.75 * few / few_stroke
