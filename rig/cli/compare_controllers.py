@@ -61,7 +61,7 @@ def compare_controllers(
     from rig.control.family import read_family
     from rig.experiment import controllers
     from rig.experiment.errors import ExperimentError
-    from rig.report.controllers import COLUMNS, STANDING, cells, places, write_competitions
+    from rig.report.controllers import COLUMNS, cells, parts, write_competitions
     from rig.spec.workspace import Workspace
 
     console = Console(stderr=as_json)
@@ -84,10 +84,10 @@ def compare_controllers(
         for outcome in one.outcomes:
             table.add_row(outcome.case, *cells(outcome))
         console.print(table)
-        if one.standings:
-            table = Table(*(f"{name}\n{unit}" for name, unit in STANDING))
-            for standing in one.standings:
-                table.add_row(*places(standing))
+        for columns, rows in parts(one.standings) if one.standings else ():
+            table = Table(*(f"{name}\n{unit}" for name, unit in columns))
+            for row in rows:
+                table.add_row(*row)
             console.print(table)
     console.print(f"comparison: {out}", soft_wrap=True, markup=False)
 

@@ -32,6 +32,10 @@ STANDING = (
     ("gain margin", "dB"),
     ("phase margin", "deg"),
 )
+ROBUST_FROM = 7
+"""Column of `STANDING` where robustness begins."""
+Columns = tuple[tuple[str, str], ...]
+Rows = list[tuple[str, ...]]
 LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)))
 
 
@@ -74,6 +78,19 @@ def places(standing: Standing) -> tuple[str, ...]:
     )
 
 
+def parts(standings: Sequence[Standing]) -> tuple[tuple[Columns, Rows], ...]:
+    """Columns and rows of two tables that are not too wide: how good, and how robust."""
+    rows = [places(one) for one in standings]
+    columns: Columns = STANDING
+    return (
+        (columns[:ROBUST_FROM], [row[:ROBUST_FROM] for row in rows]),
+        (
+            columns[:1] + columns[ROBUST_FROM:],
+            [row[:1] + row[ROBUST_FROM:] for row in rows],
+        ),
+    )
+
+
 def write_competitions(path: Path, held: Sequence[Competition]) -> None:
     """Write the page: a table of all cases together for each bench, then every case."""
     benches = ", ".join(one.family.bench for one in held)
@@ -103,7 +120,7 @@ def _sections(held: Competition) -> list[Section]:
             "liquid: of air) than with the identified one, and the least margins over all levels "
             "and volumes by the identified models. The controllers know nothing of the volumes.",
         ),
-        (Table(STANDING, [places(one) for one in held.standings]),),
+        tuple(Table(*part) for part in parts(held.standings)),
     )
     cases = dict.fromkeys(one.case for one in held.outcomes)
     return [*([overview] if held.standings else []), *(_section(name, held) for name in cases)]

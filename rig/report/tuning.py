@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +28,9 @@ from rig.report.sheet_parts import Section, Table
 
 Array = NDArray[np.float64]
 PAGE_FILE = "tuning.html"
-STEP_S = 1.5
+STEP_PERIODS = 30.0
+"""Length of the step responses over the slowest loop's time constant, 1 / crossover."""
+MOST_POINTS = 1000
 LOCUS_FACTORS = np.geomspace(0.05, 20.0, 160)
 
 
@@ -229,14 +232,16 @@ def _steps(name: str, members: tuple[Member, ...], gains: Gains) -> Chart:
     import control
 
     figure, (jump, push) = stacked(TALL, (1, 1))
-    time_s = TICK_S * np.arange(round(STEP_S / TICK_S))
+    slowest = min(margins(member.model, gains).crossover for member in members)
+    time_s = TICK_S * np.arange(round(STEP_PERIODS / slowest / TICK_S))
+    shown = slice(None, None, math.ceil(time_s.size / MOST_POINTS))
     for number, member in enumerate(members):
         colour, line = COLOURS[f"series-{number + 1}"], MODEL_LINES[number]
         followed, disturbed = closed_loop(member.model, gains)
         step = control.step_response(followed, time_s).outputs
-        jump.plot(time_s, step, line, color=colour, lw=1.4, label=_name(member))
+        jump.plot(time_s[shown], step[shown], line, color=colour, lw=1.4, label=_name(member))
         step = control.step_response(disturbed, time_s).outputs
-        push.plot(time_s, 1e3 * step, line, color=colour, lw=1.4)
+        push.plot(time_s[shown], 1e3 * step[shown], line, color=colour, lw=1.4)
     jump.axhline(1, color=COLOURS["muted"], lw=0.8)
     jump.set_ylabel("pressure (kPa)")
     push.set_ylabel("pressure (Pa)")
