@@ -37,6 +37,10 @@ class Priors:
     """Of s, around zero."""
     offset: float = float(np.radians(5.0))
     """Of the angle at zero pressure, in rad, around zero."""
+    creep: float = 0.03
+    """Of the share of the response that was still to come when levels were read, around zero:
+    creep, and hysteresis of the branch that has more levels. A few seconds after the pressure
+    elastomers lack some per cent, which looks like a modulus that is higher by as much."""
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():

@@ -104,7 +104,12 @@ class Curve:
 
 @dataclass(frozen=True)
 class SurfaceForward:
-    """The surfaces with an offset of the angle: softening is the study's model's own."""
+    """The surfaces with an offset of the angle, less what had not come yet when levels were read:
+
+        angle = offset + (1 - c) A,    force = (1 - c) F.
+
+    Softening is the study's model's own.
+    """
 
     factors: tuple[Factor, ...]
     """In SI, in the order of the study."""
@@ -154,7 +159,7 @@ class SurfaceForward:
     @property
     def names(self) -> tuple[str, ...]:
         """Unknowns, in their order."""
-        return ("modulus", "wall", "offset")
+        return ("modulus", "wall", "offset", "creep")
 
     @property
     def bounds(self) -> Array:
@@ -164,7 +169,7 @@ class SurfaceForward:
             factor = self.factors[self.order.index(name)]
             step = self.prior[name] * getattr(self.priors, name)
             found.append([(level - self.prior[name]) / step for level in (factor.low, factor.high)])
-        return np.array([*found, [-REACH, REACH]])
+        return np.array([*found, *[[-REACH, REACH]] * 2])
 
     def covered(self, at: Measured) -> Measured:
         """Levels between the study's pressures."""
@@ -176,15 +181,17 @@ class SurfaceForward:
             "modulus": self.prior["modulus"] * (1 + self.priors.modulus * unit[0]),
             "wall": self.prior["wall"] * (1 + self.priors.wall * unit[1]),
             "offset": self.priors.offset * unit[2],
+            "creep": self.priors.creep * unit[3],
         }
 
     def answers(self, unit: Array, at: Measured) -> tuple[Array, Array]:
         """Angles in rad and forces in N at the levels of `at`."""
         p = self.parameters(unit)
+        come = 1 - p["creep"]
         point = coded(self.factors, np.array([[p[name] for name in self.order]]))[0]
         return (
-            p["offset"] + self.angles.at(at.angle_pressure, point),
-            self.forces.at(at.force_pressure, point),
+            p["offset"] + come * self.angles.at(at.angle_pressure, point),
+            come * self.forces.at(at.force_pressure, point),
         )
 
     def error(self, at: Measured) -> tuple[Array, Array]:

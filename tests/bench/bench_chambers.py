@@ -35,8 +35,8 @@ MESHES = (
 )
 PRESSURES = (5e3, 50e3, 100e3, 200e3)
 ARMS, TUBE = 3, 0.0762
-GRASP = (15e3, 30e3, 45e3, 60e3, 80e3, 100e3)
-GAPS = (2e-3, 10e-3)
+GRASP = (15e3, 30e3, 45e3, 60e3)
+GAPS = (2e-3,)
 ARM_MESH = RowResolution(5e-3, 7e-3, 2)
 """The specimen's: 4 % stiff at 50 kPa."""
 

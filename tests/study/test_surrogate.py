@@ -71,8 +71,12 @@ def measured(seed: int, pressures: np.ndarray, wall: float = TRUE["wall"]) -> Me
     )
 
 
+RELAXED = Priors(creep=1e-3)
+"""Of a run that waited at every level."""
+
+
 def test_modulus_and_wall_come_back_within_their_intervals(tmp_path: Path) -> None:
-    forward = SurfaceForward.of(finished(tmp_path), ACTUATOR, MATERIAL)
+    forward = SurfaceForward.of(finished(tmp_path), ACTUATOR, MATERIAL, RELAXED)
     inside = dict.fromkeys(TRUE, 0)
     for seed in range(6):
         update = update_model(forward, measured(seed, np.linspace(0.5e3, 8e3, 9)))
@@ -88,6 +92,38 @@ def test_modulus_and_wall_come_back_within_their_intervals(tmp_path: Path) -> No
     assert min(inside.values()) >= 5
 
 
+def test_a_run_that_did_not_wait_for_creep_is_not_taken_for_another_actuator(
+    tmp_path: Path,
+) -> None:
+    study = finished(tmp_path)
+    run = measured(0, np.linspace(0.5e3, 8e3, 9))
+    early = replace(
+        run,
+        angle=TRUE["offset"] + 0.95 * (run.angle - TRUE["offset"]),
+        force=0.95 * run.force,
+    )
+    relaxed, creeping = (
+        SurfaceForward.of(study, ACTUATOR, MATERIAL, priors) for priors in (RELAXED, Priors())
+    )
+
+    def moved(forward: SurfaceForward) -> float:
+        """Of modulus and wall, in prior deviations, by what is missing from the levels."""
+        now, then = update_model(forward, early), update_model(forward, run)
+        steps = [
+            (now[name].value - then[name].value) / now[name].prior_deviation
+            for name in ("modulus", "wall")
+        ]
+        return float(np.hypot(*steps))
+
+    assert moved(relaxed) > 0.5
+    assert moved(creeping) < 0.5 * moved(relaxed)
+    update = update_model(creeping, early)
+    for name in ("modulus", "wall"):
+        low, high = update[name].interval()
+        assert low <= TRUE[name] <= high
+    assert update["creep"].value > 0.02
+
+
 def test_the_surfaces_error_is_that_of_the_check_points_and_counts(tmp_path: Path) -> None:
     study = finished(tmp_path)
     forward = SurfaceForward.of(study, ACTUATOR, MATERIAL)
@@ -100,6 +136,7 @@ def test_the_surfaces_error_is_that_of_the_check_points_and_counts(tmp_path: Pat
             [
                 (point.values["modulus"] / 450e3 - 1) / 0.05,
                 (point.values["wall"] / 1.5e-3 - 1) / 0.02,
+                0.0,
                 0.0,
             ]
         )

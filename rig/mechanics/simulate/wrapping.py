@@ -28,8 +28,10 @@ from rig.spec.material import MaterialSpec
 
 Array = NDArray[np.float64]
 
-_PENALTY = 5.0
-"""Of Young's modulus over the layer's thickness: the tube sinks in by microns at 50 kPa."""
+_PENALTY = 1.0
+"""Of Young's modulus over the bellow's height: under 50 kPa the tube sinks in by 0.1 mm, a
+thousandth of a radius of 3 inches. The whole arm lies down nearly at once; on a harder tube Newton
+chatters."""
 _TOLERANCE = 1e-5
 
 
@@ -70,7 +72,7 @@ def wrap(
             f"a cylinder of {1e3 * cylinder_radius:.4g} mm at a gap of {1e3 * gap:.4g} mm is "
             f"impossible: expected a radius above zero and a gap of zero or more."
         )
-    penalty = _PENALTY * material.young_modulus.value / geometry.strain_limiting_thickness
+    penalty = _PENALTY * material.young_modulus.value / geometry.bellow_height
     contacts: list[Contact] = []
 
     def tube(d: Discretisation, shape: BendingShape) -> tuple[Contact]:
