@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import contextlib
+
 from fastapi import FastAPI
 from nicegui import core, ui
 from starlette.types import ASGIApp
 
+from rig.errors import RigError
+from rig.spec.workspace import Workspace
 from rig.studio.access import Access
+from rig.studio.curves import Beam
+from rig.studio.design import check, open_draft
+from rig.studio.drawing import section_svg
 from rig.studio.gate import MAX_BODY, Gate
 from rig.studio.live import live_route
 from rig.studio.log import configure
 from rig.studio.pages import bench, design, runs
+from rig.studio.pages.design import FIRST
 from rig.studio.routes import routes
+from rig.studio.section import section_of
 from rig.studio.state import Studio
 
 GRACE_S = 2
@@ -39,6 +48,18 @@ def application(studio: Studio, access: Access) -> ASGIApp:
     return Gate(app, access)
 
 
+def warm_up(workspace: Workspace) -> None:
+    """Load what the first page needs before somebody waits for it: units, models, drawings."""
+    names = workspace.names("actuator")
+    if not names:
+        return
+    with contextlib.suppress(RigError):  # the page says it
+        checked = check(open_draft(workspace, FIRST if FIRST in names else names[0]), workspace)
+        if checked.spec is not None and checked.material is not None:
+            section_svg(section_of(checked.spec.geometry), "")
+            Beam.of(checked.spec, checked.material)
+
+
 def serve(studio: Studio, access: Access, *, verbose: bool) -> None:
     """Serve until somebody presses Ctrl-C; leaves nothing running.
 
@@ -47,6 +68,7 @@ def serve(studio: Studio, access: Access, *, verbose: bool) -> None:
     import uvicorn
 
     configure(verbose=verbose)
+    warm_up(studio.workspace)
     try:
         uvicorn.run(
             application(studio, access),

@@ -9,34 +9,159 @@ from __future__ import annotations
 
 import json
 import multiprocessing
+import os
+import shutil
 import socket
 import statistics
+import subprocess
+import sys
 import tempfile
 import threading
 import time
-from contextlib import ExitStack
+import urllib.request
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from itertools import pairwise
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import uvicorn
 from fastapi import FastAPI
 from websockets.sync.client import connect
 
 from rig.link.slcan import RawFrame
 from rig.studio.desk import Choice, Desk
-from rig.studio.live import live_route
+from rig.studio.live import live_route, message
 from rig.studio.seat import Seat
 from tests.studio.lab import make_lab
 
 WATCHED_S = 12.0
+VISITS = 6
+MOVES = """async () => {
+  const knob = document.querySelector('.q-slider [tabindex="0"]');
+  const said = document.querySelector('.said');
+  const times = [];
+  for (let i = 0; i < 40; i++) {
+    const redrawn = new Promise((done) => {
+      const watch = new MutationObserver(() => {
+        watch.disconnect();
+        requestAnimationFrame(done);
+      });
+      watch.observe(said, { childList: true, characterData: true, subtree: true });
+    });
+    const start = performance.now();
+    knob.dispatchEvent(new KeyboardEvent('keydown', { keyCode: 39, key: 'ArrowRight' }));
+    knob.dispatchEvent(new KeyboardEvent('keyup', { keyCode: 39, key: 'ArrowRight' }));
+    await redrawn;
+    times.push(performance.now() - start);
+  }
+  return times;
+}"""
 
 
 def main() -> None:
-    """Print the table."""
-    print("watchers  messages/s  99 % gap     pictures/s  polls/s  longest poll gap  behind  CPU")
+    """Print the tables."""
+    _pages()
+    _hour()
+    print("\nwatchers  messages/s  99 % gap     pictures/s  polls/s  longest poll gap  behind  CPU")
     for watchers in (0, 1, 4):
         print(_measured(watchers))
+
+
+def _pages() -> None:
+    """Wall times within the browser, and what they cost the server; a cold and five warm visits."""
+    from playwright.sync_api import sync_playwright
+
+    executable = shutil.which("chromium")
+    if executable is None:
+        print("no chromium: first page and slider were not measured")
+        return
+    visits = []
+    with ExitStack() as stack:
+        place = stack.enter_context(tempfile.TemporaryDirectory())
+        address, pid = stack.enter_context(_server(Path(place)))
+        kit = stack.enter_context(sync_playwright())
+        browser = kit.chromium.launch(executable_path=executable, args=["--no-sandbox"])
+        for _ in range(VISITS):
+            page = browser.new_context().new_page()
+            session = page.context.new_cdp_session(page)
+            session.send("Performance.enable")
+            cpu_s = _cpu_s(pid)
+            page.goto(address, wait_until="commit")
+            page.get_by_text("This is a sound design.").wait_for()
+            seen_s = float(page.evaluate("performance.now()")) / 1e3
+            visits.append((seen_s, _cpu_s(pid) - cpu_s, _spent_s(session)))
+        moves = page.evaluate(MOVES)
+        browser.close()
+    warm = np.median(visits[1:], axis=0)
+    print("first page   shown after   server CPU   browser CPU")
+    for name, (seen, server, script) in (("cold", visits[0]), ("warm", warm)):
+        print(f"{name:10s}  {seen:10.2f} s  {server:9.2f} s  {script:10.2f} s")
+    print(
+        f"slider to redraw: median {np.median(moves):.0f} ms, 95 % {np.quantile(moves, 0.95):.0f} "
+        f"ms of {len(moves)}; load of the machine {os.getloadavg()[0]:.1f}"
+    )
+
+
+@contextmanager
+def _server(place: Path) -> Iterator[tuple[str, int]]:
+    """A studio in a process of its own: its address and process id."""
+    make_lab(place)
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    command = [sys.executable, "-c", "from rig.cli.main import main; main()", "studio"]
+    command += ["--port", str(port)]
+    process = subprocess.Popen(command, cwd=place, stdout=subprocess.DEVNULL)
+    address = f"http://127.0.0.1:{port}"
+    try:
+        while True:
+            try:
+                urllib.request.urlopen(f"{address}/assets/studio.css").close()
+                break
+            except OSError:
+                time.sleep(0.1)
+        yield address, process.pid
+    finally:
+        process.terminate()
+        process.wait()
+
+
+def _cpu_s(pid: int) -> float:
+    fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def _spent_s(session: Any) -> float:
+    """What the page's main thread has worked."""
+    metrics = {m["name"]: m["value"] for m in session.send("Performance.getMetrics")["metrics"]}
+    return float(metrics["TaskDuration"])
+
+
+def _hour() -> None:
+    """Memory of a server whose bench is watched for an hour of bench time, as fast as it goes."""
+    with tempfile.TemporaryDirectory() as place:
+        desk = Desk(make_lab(Path(place)), Seat(time.monotonic, patience_s=1e9))
+        desk.watchers = 1
+        desk.take_control("0")
+        desk.connect("0", Choice("bellow-bending", "virtual-beam", speed=0.0))
+        number, told, at = 0, 0, {}
+        print("\nbench time, min   resident memory, MiB   messages")
+        for minutes in (5, 20, 40, 60):
+            while desk.scope.reading().time_s < 60 * minutes:
+                text, number = message(desk, "0", True, number)
+                told += len(text) > 0
+                time.sleep(0.002)
+            at[minutes] = _resident_mib()
+            print(f"{minutes:15d}   {at[minutes]:20.1f}   {told}")
+        desk.close()
+
+
+def _resident_mib() -> float:
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
 def _measured(watchers: int) -> str:

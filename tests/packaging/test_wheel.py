@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import socket
 import subprocess
 import sys
+import time
+import urllib.error
+import urllib.request
 from pathlib import Path
 
 import pytest
@@ -62,3 +67,36 @@ def test_it_carries_what_the_board_is_built_from(installed: Path) -> None:
     library = installed / "rig/_library"
     for part in ("firmware/rig_mega/rig_mega.ino", "firmware/rig.dbc", "firmware/emulator/COPYING"):
         assert (library / part).is_file(), part
+
+
+def test_its_studio_serves_its_pages(installed: Path, tmp_path: Path) -> None:
+    run(installed, tmp_path, "init", "lab")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "rig", "studio", "--port", str(port)],
+        cwd=tmp_path / "lab",
+        env={**os.environ, "PYTHONPATH": str(installed)},
+    )
+    try:
+        for path, content in (
+            ("/", "rig studio"),
+            ("/bench", "Vent and stop"),
+            ("/runs", "rig characterise"),
+            ("/assets/studio.js", "studioLive"),
+            ("/assets/studio.css", "--accent"),
+        ):
+            assert content in fetched(f"http://127.0.0.1:{port}{path}", process), path
+    finally:
+        process.terminate()
+        process.wait(30)
+
+
+def fetched(address: str, process: subprocess.Popen[bytes]) -> str:
+    """What is served there, once it is."""
+    while process.poll() is None:
+        with contextlib.suppress(urllib.error.URLError):
+            return str(urllib.request.urlopen(address).read().decode())
+        time.sleep(0.2)
+    raise AssertionError("the studio ended")
