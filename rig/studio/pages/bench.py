@@ -74,7 +74,7 @@ class BenchPage:
             self._bench = self._names("bench")
             with ui.row().classes("actions"):
                 self._seed = ui.number("seed", value=1, min=0, precision=0).props("outlined dense")
-                self._speed = ui.select(SPEEDS, value=1.0, label="speed if simulated")
+                self._speed = ui.select(SPEEDS, value=1.0, label="speed")
                 self._speed.props("outlined dense")
             with ui.row().classes("actions"):
                 self._button("Connect", self._connect, "main")

@@ -83,7 +83,9 @@ function drawTrace() {
   const canvas = shown("trace");
   const style = getComputedStyle(document.body);
   const colour = (name) => style.getPropertyValue(name).trim();
-  const width = canvas.width, height = canvas.height, left = 52, bottom = 24, top = 24;
+  // in the pixels of the screen: letters stay readable where the page is narrow
+  const width = canvas.width = canvas.clientWidth, height = canvas.height = canvas.clientHeight;
+  const left = 52, bottom = 24, top = 24;
   const pen = canvas.getContext("2d");
   const end = trace[trace.length - 1][0];
   let low = 0, high = 1;
