@@ -1,6 +1,6 @@
 """How often the 95 % interval of an angle holds the truth, over a thousand rendered benches.
 
-Run `python -m tests.bench coverage`: about twenty minutes of processor time. Each bench has a lens,
+Run `python -m tests.bench coverage`: about eight minutes of processor time. Each bench has a lens,
 a ruler, a viewpoint and a noise of its own, and three frames are taken of it.
 """
 
