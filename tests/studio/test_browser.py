@@ -210,6 +210,7 @@ def test_design_export_run_and_a_pulled_network(pages: Pages, studio: str, lab: 
 
     _press(watching, "Take control")
     _says(watching, "control", "yours")
+    _is_free(watching)  # the bench is opened again after a run
     _press(watching, "Home")
     _says(watching, "flags", "homed")
     _says(watching, "state", "idle")
@@ -239,6 +240,10 @@ def _at_the_bench(page: Any) -> None:
     _press(page, "Connect")
     _says(page, "state", "idle")
     _says(page, "notes", "known within")
+    _is_free(page)
+
+
+def _is_free(page: Any) -> None:
     page.wait_for_function("document.querySelector('[data-live=doing]').textContent == ''")
 
 
