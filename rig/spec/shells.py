@@ -47,8 +47,8 @@ class _ShellReinforcedGeometry(SpecModel):
         "one is specified",
     )
 
-    slit_number: Count
-    slit_width: Length
+    slit_number: Count = Field(description="of full width; half ones at both ends")
+    slit_width: Length = Field(description="along the axis")
 
     @property
     def chamber_length(self) -> float:
@@ -95,7 +95,7 @@ class _ShellReinforcedGeometry(SpecModel):
 class ShellReinforcedBendingGeometry(_ShellReinforcedGeometry):
     """Slits all round but for a strip below, which is bonded to the core; lengths in metres."""
 
-    family: Literal["shell-reinforced-bending"]
+    family: Literal["shell-reinforced-bending"] = Field(description="which geometry this is")
     slit_number: Count = Field(7, le=200, description="of full width; half ones at both ends")
     slit_width: Length = Field(0.001, gt=0, description="the paper's cut spacing")
     strip_width: Length = Field(
@@ -121,7 +121,7 @@ class ShellReinforcedLinearGeometry(_ShellReinforcedGeometry):
     rings between them give way.
     """
 
-    family: Literal["shell-reinforced-linear"]
+    family: Literal["shell-reinforced-linear"] = Field(description="which geometry this is")
     slit_number: Count = Field(13, le=200, description="of full width; half ones at both ends")
     slit_width: Length = Field(0.0005, gt=0, description="the paper's cut spacing")
     bridge_width: Length = Field(

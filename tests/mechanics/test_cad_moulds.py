@@ -99,5 +99,5 @@ def test_jaws_and_core_hold_an_axisymmetric_bellow() -> None:
 
 
 def test_what_is_printed_has_no_mould(default_geometry) -> None:
-    with pytest.raises(CadError, match="bellow-bending is printed"):
+    with pytest.raises(CadError, match="no mould for a bellow-bending: it is printed"):
         moulds_of(default_geometry)

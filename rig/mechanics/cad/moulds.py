@@ -38,8 +38,8 @@ def moulds_of(geometry: Geometry) -> tuple[Part, ...]:
             return moulds_of(geometry.finger)
         case _:
             raise CadError(
-                f"There is no mould for a {geometry.family}: it is printed, blown, or cast in one "
-                f"we do not draw yet. `rig export --stl` writes what a printer takes."
+                f"There is no mould for a {geometry.family}: it is printed, blown, or cast in a "
+                f"mould that is not drawn yet. `rig export --stl` writes what a printer takes."
             )
 
 
