@@ -9,6 +9,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
 LOOPBACK = "127.0.0.1"
 NS = 1_000_000_000
 POLL_S = 0.2
+GRACE_S = 3.0
+"""For clients to subscribe to channels that are new. On a busy machine the server announces one
+before it accepts subscriptions to it, so that a client has to ask again."""
 BACKLOG = 65_536
 """Messages that may wait for a client before the oldest are dropped; a chunk comes at once."""
 
@@ -42,8 +46,8 @@ class LiveServer:
         self._library = foxglove
         self._context = foxglove.Context()
         self._channels: dict[str, foxglove.Channel] = {}
-        self._subscribed = threading.Event()
-        listener: Any = _Listener(self._subscribed)  # the protocol's other events need capabilities
+        self._listening = _Listener()
+        listener: Any = self._listening  # the protocol's other events need capabilities
         try:
             self._server = foxglove.start_server(
                 name="rig",
@@ -94,17 +98,28 @@ class LiveServer:
 
     def wait_for_somebody(self, timeout_s: float) -> bool:
         """Whether somebody has subscribed to anything, after waiting for it."""
-        return self._subscribed.wait(timeout_s)
+        return self._listening.wait(lambda topics: bool(topics), timeout_s)
+
+    def wait_for_all(self, timeout_s: float) -> bool:
+        """Whether somebody has subscribed to each channel, after waiting for it."""
+        return self._listening.wait(lambda topics: topics >= self._channels.keys(), timeout_s)
 
 
 class _Listener:
-    """Notes the first subscription."""
+    """Notes what is subscribed to."""
 
-    def __init__(self, subscribed: threading.Event) -> None:
-        self._subscribed = subscribed
+    def __init__(self) -> None:
+        self._topics: set[str] = set()
+        self._more = threading.Condition()
 
-    def on_subscribe(self, *_: Any) -> None:
-        self._subscribed.set()
+    def wait(self, enough: Callable[[set[str]], bool], timeout_s: float) -> bool:
+        with self._more:
+            return self._more.wait_for(lambda: enough(self._topics), timeout_s)
+
+    def on_subscribe(self, _: Any, channel: Any) -> None:
+        with self._more:
+            self._topics.add(channel.topic)
+            self._more.notify_all()
 
     def on_unsubscribe(self, *_: Any) -> None:
         """A client that leaves changes nothing: the run goes on."""
@@ -130,9 +145,12 @@ def relay(follower: LogFollower, server: LiveServer, speed: float) -> int:
         new = [channel for channel in follower.channels.values() if server.advertise(channel)]
         if not somebody:
             somebody = server.wait_for_somebody(POLL_S)
-            time.sleep(POLL_S)  # the first subscription is followed by those of other channels
+            if somebody:  # the first subscription is followed by those of other channels
+                server.wait_for_all(GRACE_S)
             continue
-        if new or not waiting:  # what is sent before clients subscribe is lost to them
+        if new:  # what is sent before clients subscribe is lost to them
+            server.wait_for_all(GRACE_S)
+        if not waiting:
             time.sleep(POLL_S)
             continue
         for channel, time_ns, payload in follower.messages(waiting.popleft()):
