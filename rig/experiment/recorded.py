@@ -73,17 +73,23 @@ def carry_out(
     says if nothing went wrong.
     """
     recorder = LinkRecorder(record)
+    crash: BaseException | None = None
+    leaving = False
 
     def tap(frames: Sequence[RawFrame], messages: Sequence[Message]) -> None:
-        recorder(frames, messages)
-        if watch is not None:
-            watch(frames, messages)
+        try:
+            recorder(frames, messages)
+            if watch is not None and crash is None:
+                watch(frames, messages)
+        except (OSError, RecordError):
+            # the log may be what broke (a full disk): venting must not depend on it
+            if not leaving:
+                raise
 
     link.set_tap(tap)
     for caution in cautions:
         record.event(link.now_s, "caution", {"what": caution}, "warning")
     error: RigError | None = None
-    crash: BaseException | None = None
     try:
         work(recorder)
         stop = StopDocument(exit_status="success", reason=success)
@@ -96,9 +102,7 @@ def carry_out(
     except BaseException as unforeseen:  # the bench must be safe before anything else is told
         crash = unforeseen
         stop = StopDocument(exit_status="failed", reason=f"{type(crash).__name__}: {crash}")
-        # the log may be what broke (a full disk): venting must not depend on it
-        recorder.drop_what_cannot_be_written()
-        link.set_tap(recorder)
+    leaving = True
     try:
         stage("making the bench safe")
         ending = make_safe(link)

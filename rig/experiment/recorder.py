@@ -22,11 +22,6 @@ class LinkRecorder:
         self._record = record
         self._frames: list[RawFrame] = []
         self._messages: list[Message] = []
-        self._may_drop = False
-
-    def drop_what_cannot_be_written(self) -> None:
-        """From now on an error of the disk loses the batch instead of reaching the link."""
-        self._may_drop = True
 
     def __call__(self, frames: Sequence[RawFrame], messages: Sequence[Message]) -> None:
         """Take a batch."""
@@ -44,16 +39,14 @@ class LinkRecorder:
         )
 
     def flush(self) -> None:
-        """Write what was gathered."""
+        """Write what was gathered; what cannot be written is lost."""
         try:
             self._write()
             if self._record.is_live:
                 self._record.hand_on()
-        except OSError:
-            if not self._may_drop:
-                raise
-        self._frames.clear()
-        self._messages.clear()
+        finally:
+            self._frames.clear()
+            self._messages.clear()
 
     def _write(self) -> None:
         if not self._frames:

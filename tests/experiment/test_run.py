@@ -25,6 +25,7 @@ from rig.link.errors import BoardFaultError, UnexpectedStateError
 from rig.link.schema import load_schema
 from rig.plant.camera import CameraFault
 from rig.plant.plant import Faults
+from rig.record.bulk_writer import BulkWriter
 from rig.record.documents import PointDocument
 from rig.record.errors import RecordError
 from rig.record.reader import RunReader
@@ -152,6 +153,33 @@ def test_a_disk_that_fills_between_points_does_not_keep_the_bench_from_venting(
     monkeypatch.setattr(RunWriter, "can_frames", fills)
     monkeypatch.setattr("rig.experiment.recorder.BATCH_FRAMES", 10)
     with pytest.raises(RecordError, match="Free space"):
+        take(tmp_path / "run", make_request(), prepare=benches.append)
+    truth = benches[0].plant.truth()
+    assert abs(truth.gauge_pressure) < 50.0
+    assert truth.pushed_volume < 1e-8
+
+
+def test_a_log_that_cannot_grow_does_not_keep_the_bench_from_venting(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As above, but the file refuses, which the writer of logs tells in its own words."""
+    write = BulkWriter._write
+    benches: list[VirtualBench] = []
+    full = False
+
+    def fills(self: BulkWriter, data: bytes) -> None:
+        nonlocal full
+        full = full or (bool(benches) and benches[0].plant.truth().gauge_pressure > 4e3)
+        if full:
+            monkeypatch.setattr(self, "_stream", device)
+        write(self, data)
+
+    monkeypatch.setattr(BulkWriter, "_write", fills)
+    monkeypatch.setattr("rig.experiment.recorder.BATCH_FRAMES", 10)
+    with (
+        Path("/dev/full").open("wb", buffering=0) as device,
+        pytest.raises(RecordError, match="make room"),
+    ):
         take(tmp_path / "run", make_request(), prepare=benches.append)
     truth = benches[0].plant.truth()
     assert abs(truth.gauge_pressure) < 50.0
