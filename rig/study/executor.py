@@ -202,8 +202,12 @@ class DaskCluster:
                 client.submit(timed, function, task, pure=False): index
                 for index, task in enumerate(tasks)
             }
-            for future in distributed.as_completed(futures):
-                if future.status == "finished":
+            completed = distributed.as_completed(futures)
+            for future in completed:
+                if future.status == "lost":
+                    # computed, but its worker died before it was asked for: it is computed again
+                    completed.add(future)
+                elif future.status == "finished":
                     value, error, seconds, defect = future.result()
                     yield Outcome(futures[future], value, error, seconds, "dask", defect)
                 else:

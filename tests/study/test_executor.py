@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Iterable, Iterator
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -12,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import doubles
 
 from rig.study.errors import StudyError
-from rig.study.executor import Executor, InProcess, LocalProcesses, local_dask
+from rig.study.executor import DaskCluster, Executor, InProcess, LocalProcesses, local_dask
 from rig.study.extras import package
 
 
@@ -66,6 +69,44 @@ def test_dask_gives_the_same(tmp_path: Path) -> None:
     tasks = [(number, str(tmp_path)) for number in range(4)]
     outcomes = sorted(local_dask(2).map(doubles.dying_at_once, tasks), key=lambda o: o.index)
     assert [o.value for o in outcomes] == [0, 1, 2, 3]
+
+
+def test_what_dask_computed_and_lost_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its worker died between the end of the task and the question for the result."""
+
+    class Future:
+        def __init__(self, task: int) -> None:
+            self.task, self.statuses = task, ["lost", "finished"] if task else ["finished"]
+
+        @property
+        def status(self) -> str:
+            return self.statuses[0]
+
+        def result(self) -> tuple[int, None, float, bool]:
+            return self.task, None, 0.0, False
+
+        def exception(self) -> None:
+            return None
+
+    class Completed:
+        def __init__(self, futures: Iterable[Future]) -> None:
+            self.futures = list(futures)
+
+        def add(self, future: Future) -> None:
+            future.statuses.pop(0)
+            self.futures.append(future)
+
+        def __iter__(self) -> Iterator[Future]:
+            while self.futures:
+                yield self.futures.pop(0)
+
+    client = SimpleNamespace(submit=lambda _function, _work, task, **_: Future(task))
+    library = SimpleNamespace(Client=lambda _: nullcontext(client), as_completed=Completed)
+    monkeypatch.setattr("rig.study.executor.package", lambda *_: library)
+    outcomes = DaskCluster(nullcontext).map(doubles.threads_of, [0, 1, 2])
+    assert sorted((o.index, o.value, o.crashed) for o in outcomes) == [
+        (number, number, False) for number in range(3)
+    ]
 
 
 def test_a_missing_extra_is_named() -> None:
