@@ -15,12 +15,9 @@ from rig.vision.errors import UntrustedFrameError
 from rig.vision.footage import Frame
 from rig.vision.marker_angle import MarkerAngleMeter
 from rig.vision.measure import AngleMeasurement, AngleMeter
-from rig.vision.overlay import draw_overlay
+from rig.vision.overlay import COVERAGE_FACTOR, draw_overlay
 from rig.vision.segment import Image
 from rig.vision.table import ANGLE, BACKBONE, DISPLACEMENT, Column
-
-COVERAGE_FACTOR = 2.0
-"""Of an angle of one frame, for about 95 %: its uncertainty is given as a whole."""
 
 
 @dataclass(frozen=True)

@@ -100,7 +100,7 @@ def force_point(
     outlying = np.abs(counts - median) > HAMPEL_LIMIT * max(scale, 1.0)
     rejected += ["outlier"] * int(outlying.sum())
     grams = counts[~outlying] / calibration.counts_per_gram
-    value = calibration.corrected(float(grams.mean()) / 1e3) * 1e3
+    value = calibration.grams(float(counts[~outlying].mean()))
     spread = _spread(grams)
     parts = (
         readings(spread, len(grams), "g"),

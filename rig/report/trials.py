@@ -110,7 +110,7 @@ def _part_data(reader: RunReader, setup: Setup, part: PartDocument, program: Pro
         pressure["pressure_kpa"][inside],
         pressure["plunger_ml"][inside] - part.plunger_from_ml,
         cell["time_s"][weighed] - part.from_s,
-        counts / setup.calibrations.load_cell.counts_per_gram,
+        np.array([setup.calibrations.load_cell.grams(float(word)) for word in counts]),
         tuple(look for look in reader.looks() if look.key == part.key),
     )
 

@@ -139,6 +139,10 @@ class LoadCellCalibration(Calibration):
         ge=0, description="standard uncertainty of the zero after tare, from drift"
     )
 
+    def grams(self, counts: float) -> float:
+        """Force in grams-force of counts, tare removed."""
+        return self.corrected(counts / self.counts_per_gram / 1e3) * 1e3
+
     def bow_share(self, load: float) -> float:
         """Share of the bow at a `load` in kg: 0 at zero, 1 in the middle of the span."""
         return bow_share(load, self.span)

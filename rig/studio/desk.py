@@ -32,7 +32,7 @@ from rig.record.documents import PartDocument, PointDocument, PointKey
 from rig.spec.free_path import first_free
 from rig.spec.workspace import Setup, Workspace
 from rig.studio.errors import StudioError
-from rig.studio.look import NOTHING, Look, Lookout, grams
+from rig.studio.look import NOTHING, Look, Lookout
 from rig.studio.scope import Scope
 from rig.studio.seat import PATIENCE_S, Seat
 from rig.studio.watched import Glances, Pace, WatchedBench
@@ -117,7 +117,7 @@ class Desk:
         reading, setup = self.scope.reading(), self._setup
         if setup is None or reading.load_cell_counts is None or "tared" not in reading.flags:
             return None
-        return grams(reading.load_cell_counts, setup.calibrations.load_cell)
+        return setup.calibrations.load_cell.grams(reading.load_cell_counts)
 
     # --- asked by browsers -----------------------------------------------------------------
 

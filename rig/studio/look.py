@@ -1,4 +1,4 @@
-"""What the sensors say in the units people read: the angle in a picture, the force of a count."""
+"""What the camera says in the units people read: the angle in a picture."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 
 import cv2
 
-from rig.spec.calibration import LoadCellCalibration
 from rig.vision.errors import VisionError
 from rig.vision.measure import AngleMeter
-from rig.vision.overlay import draw_overlay
+from rig.vision.overlay import COVERAGE_FACTOR, draw_overlay
 from rig.vision.segment import decoded
 
 JPEG_QUALITY = 80
@@ -46,13 +45,8 @@ def looked_at(jpeg: bytes, meter: AngleMeter) -> Look:
     _, coded = cv2.imencode(
         ".jpg", draw_overlay(image, found), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
     )
-    u95 = None if found.angle_deg is None else 2.0 * found.u_deg
+    u95 = None if found.angle_deg is None else COVERAGE_FACTOR * found.u_deg
     return Look(coded.tobytes(), found.angle_deg, u95, found.reason)
-
-
-def grams(counts: float, calibration: LoadCellCalibration) -> float:
-    """Force in grams-force of load-cell counts, tare removed."""
-    return calibration.corrected(counts / calibration.counts_per_gram / 1e3) * 1e3
 
 
 class Lookout:

@@ -23,7 +23,7 @@ from rig.spec.calibration import LoadCellCalibration
 from rig.spec.workspace import BenchCalibrations
 from rig.studio.curves import Array
 from rig.studio.errors import StudioError
-from rig.studio.look import grams, looked_at
+from rig.studio.look import looked_at
 from rig.vision.measure import AngleMeter
 
 LARGEST_LOG = 256 << 20
@@ -153,7 +153,7 @@ def _forces(reader: RunReader, calibration: LoadCellCalibration) -> Series:
         return Series(np.empty(0), np.empty(0))
     last_beat = np.searchsorted(beat["time_s"], cell["time_s"], side="right") - 1
     tared = (last_beat >= 0) & (beat["tared"][last_beat] > 0)
-    force = [grams(float(counts), calibration) for counts in cell["load_cell_counts"][tared]]
+    force = [calibration.grams(float(counts)) for counts in cell["load_cell_counts"][tared]]
     return Series(cell["time_s"][tared], np.array(force))
 
 

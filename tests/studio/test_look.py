@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rig.spec.calibration import LoadCellCalibration
-from rig.studio.look import Look, Lookout, grams, looked_at
+from rig.studio.look import Look, Lookout, looked_at
 from rig.vision.measure import AngleMeter
 
 
@@ -29,8 +29,8 @@ def test_a_picture_that_cannot_be_read_or_trusted_gives_a_reason() -> None:
 
 def test_counts_become_grams_with_the_bow_of_the_cell() -> None:
     cell = LoadCellCalibration.model_construct(counts_per_gram=400.0, span=0.1, bow=2e-3)
-    assert grams(0.0, cell) == 0.0
-    assert grams(400.0 * 50.0, cell) == pytest.approx(52.0)
+    assert cell.grams(0.0) == 0.0
+    assert cell.grams(400.0 * 50.0) == pytest.approx(52.0)
 
 
 def test_pictures_that_come_too_fast_replace_each_other() -> None:
