@@ -14,7 +14,7 @@ import numpy as np
 from rig.spec.calibration import CameraCalibration, RulerCalibration
 from rig.vision.errors import UntrustedFrameError
 from rig.vision.lines import FloatArray
-from rig.vision.markers import find_markers
+from rig.vision.markers import both, everywhere, find_markers
 from rig.vision.motion import ConstantVelocity, require_later
 from rig.vision.parts import SMALL_RAD, SeenParts, sheared
 from rig.vision.plane import PicturePlane, rectify, require_picture
@@ -122,12 +122,8 @@ class DisplacementTracker:
             found |= find_markers(image, self._zero.places_px[0], reach)
             found |= find_markers(image, expected.values, reach + moved)
         if any(name not in found for name in self._names):
-            everywhere = 0.5 * np.array(image.shape[1::-1]), float(max(image.shape))
-            found = find_markers(image, *everywhere) | found
-        missing = [str(name) for name in self._names if name not in found]
-        if missing:
-            raise UntrustedFrameError(f"marker {' and '.join(missing)} not found: hidden, blurred?")
-        return [found[name] for name in self._names]
+            found = find_markers(image, *everywhere(image)) | found
+        return both(found, self._names)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import numpy as np
 from rig.spec.calibration import CameraCalibration, RulerCalibration
 from rig.vision.errors import UntrustedFrameError
 from rig.vision.lines import FloatArray
-from rig.vision.markers import find_markers
+from rig.vision.markers import both, everywhere, find_markers
 from rig.vision.measure import (
     AngleMeasurement,
     FrameGeometry,
@@ -56,12 +56,7 @@ class MarkerAngleMeter:
             return AngleMeasurement(None, 0.0, 0.0, False, str(why), None, FrameGeometry())
 
     def _measured(self, image: Image) -> AngleMeasurement:
-        height, width = image.shape[:2]
-        found = find_markers(image, 0.5 * np.array([width, height]), float(max(width, height)))
-        missing = [str(name) for name in (self.fixed, self.moving) if name not in found]
-        if missing:
-            raise UntrustedFrameError(f"marker {' and '.join(missing)} not found: hidden, blurred?")
-        corners = found[self.fixed], found[self.moving]
+        corners = both(find_markers(image, *everywhere(image)), (self.fixed, self.moving))
         plane, marks = PicturePlane(self.camera), np.empty((0, 2))
         if self.ruler is not None:
             seen = find_ruler(pyramid(image), self.ruler.marks)

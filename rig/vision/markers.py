@@ -5,8 +5,22 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from rig.vision.errors import UntrustedFrameError
 from rig.vision.lines import FloatArray
 from rig.vision.segment import Image
+
+
+def everywhere(image: Image) -> tuple[FloatArray, float]:
+    """The window of `find_markers` that is the whole picture."""
+    return 0.5 * np.array(image.shape[1::-1]), float(max(image.shape))
+
+
+def both(found: dict[int, FloatArray], names: tuple[int, int]) -> list[FloatArray]:
+    """Corners (4, 2) px of two markers; raises UntrustedFrameError for what was not found."""
+    missing = [str(name) for name in names if name not in found]
+    if missing:
+        raise UntrustedFrameError(f"marker {' and '.join(missing)} not found: hidden, blurred?")
+    return [found[name] for name in names]
 
 
 def find_markers(image: Image, middle: FloatArray, reach: float) -> dict[int, FloatArray]:
