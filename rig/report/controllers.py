@@ -21,13 +21,9 @@ COLUMNS = (
     ("effort", "mL/s"),
 )
 STANDING = (
-    ("controller", ""),
-    ("settling", "s"),
-    ("overshoot", "%"),
-    ("steady RMSE", "kPa"),
-    ("mean absolute error", "kPa"),
+    *COLUMNS[:-1],
     ("of sines", "kPa"),
-    ("effort", "mL/s"),
+    COLUMNS[-1],
     ("worst volume", "times the error"),
     ("gain margin", "dB"),
     ("phase margin", "deg"),
@@ -52,29 +48,28 @@ class Competition:
 
 def cells(outcome: Outcome) -> tuple[str, ...]:
     """A row of the table."""
-    return (
-        outcome.controller,
-        "-" if outcome.settling_s is None else f"{outcome.settling_s:.2f}",
-        f"{outcome.overshoot_percent:.1f}",
-        f"{outcome.steady_rmse_kpa:.4f}",
-        f"{outcome.mae_kpa:.3f}",
-        f"{outcome.effort_ml_s:.2f}",
-    )
+    return (*_regulated(outcome), f"{outcome.effort_ml_s:.2f}")
 
 
 def places(standing: Standing) -> tuple[str, ...]:
     """A row of the table of all cases together."""
     return (
-        standing.controller,
-        "-" if standing.settling_s is None else f"{standing.settling_s:.2f}",
-        f"{standing.overshoot_percent:.1f}",
-        f"{standing.steady_rmse_kpa:.4f}",
-        f"{standing.mae_kpa:.3f}",
+        *_regulated(standing),
         f"{standing.sine_mae_kpa:.3f}",
         f"{standing.effort_ml_s:.2f}",
         f"{standing.worst_volume:.2f}",
         f"{standing.gain_db:.1f}",
         f"{standing.phase_deg:.0f}",
+    )
+
+
+def _regulated(one: Outcome | Standing) -> tuple[str, ...]:
+    return (
+        one.controller,
+        "-" if one.settling_s is None else f"{one.settling_s:.2f}",
+        f"{one.overshoot_percent:.1f}",
+        f"{one.steady_rmse_kpa:.4f}",
+        f"{one.mae_kpa:.3f}",
     )
 
 
