@@ -31,6 +31,7 @@ _HEX = np.array(
         *((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)),
     ]
 )
+_QUAD = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (0, -1), (1, 0), (0, 1), (-1, 0)])
 _TET = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)])
 
 
@@ -67,7 +68,7 @@ class DeckFile:
         points, weights = get_quadrature(RefTet if count == 10 else RefHex, 6)
         if count == 20:
             points, weights = 2 * points - 1, 8 * weights
-        slopes = _slopes(count, points)
+        slopes = slopes_at(count, points)
         for nodes in self.elements.values():
             places = np.array([self.nodes[n] for n in nodes])
             yield np.linalg.det(np.einsum("nd,njq->qdj", places, slopes)), weights
@@ -94,11 +95,11 @@ class DeckFile:
             corner = local[np.array(_FACES[count][face - 1]) - 1]
             sides = np.stack((corner[1] - corner[0], corner[-1] - corner[0]), axis=1)
             points = corner[0][:, None] + sides @ flat
-            gradient = np.einsum("nd,njq->qdj", places, _slopes(count, points))
+            gradient = np.einsum("nd,njq->qdj", places, slopes_at(count, points))
             tangents = gradient @ sides
             # corners go round a face so that its normal points into the element
             normal = -np.cross(tangents[:, :, 0], tangents[:, :, 1]) * weights[:, None]
-            at = np.einsum("nd,nq->qd", places, _values(count, points))
+            at = np.einsum("nd,nq->qd", places, values_at(count, points))
             area += normal.sum(axis=0)
             volume += float((at * normal).sum()) / 3
         return area, volume
@@ -144,29 +145,31 @@ def read_deck(path: Path) -> DeckFile:
     return deck
 
 
-def _values(count: int, points: np.ndarray) -> np.ndarray:
+def values_at(count: int, points: np.ndarray) -> np.ndarray:
+    """Shape functions of an element of `count` nodes at points (dim, n), (count, n)."""
     if count == 10:
         bary = np.vstack((1 - points.sum(axis=0), points))
         middles = [4 * bary[a] * bary[b] for a, b in _TET_EDGES]
         return np.stack([*(b * (2 * b - 1) for b in bary), *middles])
-    result = []
-    for node in _HEX:
+    dim, result = len(points), []
+    for node in {8: _QUAD, 20: _HEX}[count]:
         factor = 1 + node[:, None] * points
         if np.all(node != 0):
-            result.append(factor.prod(axis=0) / 8 * ((node[:, None] * points).sum(axis=0) - 2))
+            corner = (node[:, None] * points).sum(axis=0) - (dim - 1)
+            result.append(factor.prod(axis=0) / 2**dim * corner)
         else:
             along = int(np.flatnonzero(node == 0)[0])
-            others = [i for i in range(3) if i != along]
-            result.append((1 - points[along] ** 2) * factor[others].prod(axis=0) / 4)
+            others = [i for i in range(dim) if i != along]
+            result.append((1 - points[along] ** 2) * factor[others].prod(axis=0) / 2 ** (dim - 1))
     return np.stack(result)
 
 
-def _slopes(count: int, points: np.ndarray) -> np.ndarray:
-    """By complex steps, (nodes, 3, points): nothing to derive, nothing to get wrong."""
+def slopes_at(count: int, points: np.ndarray) -> np.ndarray:
+    """By complex steps, (nodes, dim, points): nothing to derive, nothing to get wrong."""
     tiny = 1e-30
     slopes = []
-    for i in range(3):
+    for i in range(len(points)):
         moved = points.astype(complex)
         moved[i] += 1j * tiny
-        slopes.append(_values(count, moved).imag / tiny)
+        slopes.append(values_at(count, moved).imag / tiny)
     return np.stack(slopes, axis=1)

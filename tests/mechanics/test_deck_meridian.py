@@ -23,12 +23,11 @@ from rig.mechanics.simulate.axisymmetric import axisymmetric_model
 from rig.mechanics.simulate.joint import JointModel, joint_model
 from rig.spec.actuator import BellowAxisymmetricGeometry, BellowJointGeometry
 from rig.spec.workspace import Workspace, library_root
-from tests.mechanics.deck_reader import DeckFile, read_deck
+from tests.mechanics.deck_reader import DeckFile, read_deck, slopes_at, values_at
 
 PRESSURE = 40e3
 LIBRARY = Workspace(library_root(), is_library=True)
 # Abaqus Analysis User's Guide, Section 28.1.3: corners anticlockwise, then the middles between them
-_PLACES = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (0, -1), (1, 0), (0, 1), (-1, 0)])
 _FACES = ((0, 4, 1), (1, 5, 2), (2, 6, 3), (3, 7, 0))
 
 
@@ -45,32 +44,13 @@ def _written(model, folder: Path, program: Program = Program.CALCULIX) -> DeckFi
     return read_deck(folder / "body.inp")
 
 
-def _shape(points: np.ndarray) -> np.ndarray:
-    """Values of the eight functions at points (2, n), (8, n)."""
-    values = []
-    for place in _PLACES:
-        factors = 1 + place[:, None] * points
-        if np.all(place != 0):
-            values.append(factors.prod(axis=0) / 4 * ((place[:, None] * points).sum(axis=0) - 1))
-        else:
-            along = int(np.flatnonzero(place == 0)[0])
-            values.append((1 - points[along] ** 2) * factors[1 - along] / 2)
-    return np.array(values)
-
-
-def _slopes(points: np.ndarray) -> np.ndarray:
-    tiny = 1e-30
-    moved = [points.astype(complex) + 1j * tiny * np.eye(2)[i][:, None] for i in range(2)]
-    return np.stack([_shape(p).imag / tiny for p in moved], axis=1)
-
-
 def _volumes(deck: DeckFile) -> np.ndarray:
     """Of every element turned about the axis, in mm3; clockwise ones are negative."""
     points, weights = get_quadrature(RefQuad, 6)
     at, weights = 2 * points - 1, 4 * weights
     places = np.array([[deck.nodes[n] for n in nodes] for nodes in deck.elements.values()])
-    slopes = np.einsum("end,niq->eqdi", places, _slopes(at))
-    radius = places[:, :, 0] @ _shape(at)
+    slopes = np.einsum("end,niq->eqdi", places, slopes_at(8, at))
+    radius = places[:, :, 0] @ values_at(8, at)
     return 2 * np.pi * (np.linalg.det(slopes) * radius) @ weights
 
 

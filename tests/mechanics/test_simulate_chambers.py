@@ -13,7 +13,7 @@ from rig.mechanics.fe.extremes import summarise
 from rig.mechanics.fe.rotation import rotation_vector
 from rig.mechanics.job import Job
 from rig.mechanics.mesh.chamber_row import RowResolution, mesh_chamber_row
-from rig.mechanics.simulate.bending import FREE_OPTIONS, Layer, bending_model_on
+from rig.mechanics.simulate.bending import FREE_OPTIONS, bending_model_on
 from rig.mechanics.simulate.chambers import (
     multi_chamber_bending_model,
     multi_chamber_linear_model,
@@ -22,6 +22,7 @@ from rig.mechanics.simulate.chambers import (
 from rig.mechanics.simulate.energies import mixed_energies
 from rig.mechanics.simulate.families import FAMILIES
 from rig.mechanics.simulate.inflation import Inflation
+from rig.mechanics.simulate.solids import Layer
 from rig.spec.chambers import (
     BellowRectangularGeometry,
     MultiChamberBendingGeometry,

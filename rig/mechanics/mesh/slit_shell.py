@@ -85,10 +85,10 @@ def mesh_slit_shell(
     planes = np.concatenate([sets[name] for name in ("symmetry", "floor") if name in sets])
     sets["edges"] = np.setdiff1d(mine, np.concatenate([planes, at_start, at_end]))
     mesh = mesh.with_boundaries(sets, boundaries_only=False)
-    farthest = np.hypot(mesh.p[1, mesh.t], mesh.p[2, mesh.t]).min(axis=0)
+    nearest = np.hypot(mesh.p[1, mesh.t], mesh.p[2, mesh.t]).min(axis=0)
     return SlitShellMesh(
         mesh=mesh,
-        shell=np.flatnonzero(farthest > shape.core_radius - _SAME),
+        shell=np.flatnonzero(nearest > shape.core_radius - _SAME),
         shape=shape,
     )
 

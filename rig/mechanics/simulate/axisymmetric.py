@@ -8,7 +8,6 @@ does not, see docs/validation/auysakul2023.md.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from rig.mechanics.fe import (
@@ -17,7 +16,6 @@ from rig.mechanics.fe import (
     PressureSurface,
     Solid,
     Solution,
-    Support,
     discretise,
 )
 from rig.mechanics.mesh.bellow_axisymmetric import (
@@ -26,30 +24,18 @@ from rig.mechanics.mesh.bellow_axisymmetric import (
     mesh_axisymmetric_bellow,
 )
 from rig.mechanics.simulate.energies import mixed_energies
+from rig.mechanics.simulate.meridian import MeridianModel, supports_of
 from rig.spec.actuator import BellowAxisymmetricGeometry
 from rig.spec.material import MaterialSpec
 
 
 @dataclass(frozen=True)
-class AxisymmetricModel:
+class AxisymmetricModel(MeridianModel):
     """The whole actuator, with what turns its state into elongation."""
 
-    model: Model
-    soft: Solid
     shape: AxisymmetricBellow
     top_centre: int
     """Node in the middle of the top's outer face."""
-    density: float
-    """Of the soft material in kg/m3."""
-    acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """No weight."""
-    mirror: None = None
-    """Nothing is mirrored."""
-
-    @property
-    def planes(self) -> Mapping[str, int]:
-        """The axis, and the component of displacement that it holds."""
-        return {"axis": 0}
 
     def measures(self, solution: Solution) -> dict[str, float]:
         """Displacement (rise of the top's centre) and volume; it does not bend."""
@@ -81,11 +67,8 @@ def axisymmetric_model(
     model = Model(
         d,
         [soft],
-        supports=[
-            Support.of(d, d.nodes_on("clamped"), (0, 1)),
-            Support.of(d, d.nodes_on("axis"), (0,)),
-        ],
+        supports=supports_of(d),
         surface=PressureSurface(d, d.facets_on("cavity"), follower=follower),
     )
     (top_centre,) = d.nodes_at(r=0.0, z=shape.height)
-    return AxisymmetricModel(model, soft, shape, int(top_centre), material.density.value)
+    return AxisymmetricModel(model, soft, material.density.value, shape, int(top_centre))

@@ -7,7 +7,7 @@ material says otherwise, mixed in pressure, follower pressure in the cavity, gra
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.mechanics.fe import (
-    Discretisation,
     Model,
     Options,
     PressureSurface,
@@ -28,12 +27,10 @@ from rig.mechanics.fe import (
     gravity,
 )
 from rig.mechanics.fe.coordinates import Bending
-from rig.mechanics.fe.model import Interface, Item
-from rig.mechanics.hyperelastic import Energy, Volumetric
 from rig.mechanics.mesh.bellow_bending import BendingResolution, mesh_bending_bellow
-from rig.mechanics.simulate.energies import mixed_energies
 from rig.mechanics.simulate.flanks import Flanks
 from rig.mechanics.simulate.shape import BendingBody, BendingShape
+from rig.mechanics.simulate.solids import Items, Layer, MakeInterfaces, solids_of
 from rig.spec.actuator import BellowBendingGeometry
 from rig.spec.material import MaterialSpec
 from rig.spec.quantity import STANDARD_GRAVITY
@@ -45,15 +42,6 @@ HANGING = (STANDARD_GRAVITY, 0.0, 0.0)
 FREE_OPTIONS = Options(correction=2e-5, first_step=0.35)
 """The tip moves some 60 mm: corrections below 1 um change its angle by 0.001 deg. The
 actuator is softest at first: a short step there leaves something to extrapolate from."""
-
-
-@dataclass(frozen=True)
-class Layer:
-    """Elements of another material."""
-
-    elements: NDArray[np.int64]
-    distortion: Energy
-    volume: Volumetric
 
 
 @dataclass(frozen=True)
@@ -120,7 +108,7 @@ def bending_model(
     resolution: BendingResolution | None = None,
     acceleration: tuple[float, float, float] = HANGING,
     cap_density: float | None = None,
-    items: Callable[[Discretisation, BendingShape], Sequence[Item]] | None = None,
+    items: Items | None = None,
     arc: bool = True,
 ) -> BendingModel:
     """Mesh the actuator and put its model together.
@@ -150,23 +138,17 @@ def bending_model_on(
     order: int | None = None,
     acceleration: tuple[float, float, float] = HANGING,
     cap_density: float | None = None,
-    items: Callable[[Discretisation, BendingShape], Sequence[Item]] | None = None,
-    interfaces: Callable[[Discretisation], Sequence[Interface]] | None = None,
+    items: Items | None = None,
+    interfaces: MakeInterfaces | None = None,
     arc: bool = True,
 ) -> BendingModel:
     """The same on a mesh that is there already, where some elements may be of another material.
 
-    `mixed` and `order` as `discretise` takes them. `interfaces` makes what joins parts of the mesh
-    and remembers its path.
+    `mixed` and `order` as `discretise` takes them.
     """
     d = discretise(body.mesh, mixed=mixed, order=order)
     density = material.density.value
-    others = np.zeros(0, dtype=np.int64) if layer is None else layer.elements
-    rest = np.setdiff1d(np.arange(len(d.connectivity)), others)
-    soft = Solid(d, *mixed_energies(material), elements=rest if len(others) else None)
-    solids = [soft]
-    if layer is not None:
-        solids.append(Solid(d, layer.distortion, layer.volume, elements=others))
+    solids = solids_of(d, material, layer)
     shape = body.shape
     weight = shape.cap_mass(density if cap_density is None else cap_density) / 2
     cap = d.nodes_on("cap")
@@ -196,4 +178,4 @@ def bending_model_on(
         if arc
         else None,
     )
-    return BendingModel(model, soft, shape, density, acceleration)
+    return BendingModel(model, solids[0], shape, density, acceleration)

@@ -12,7 +12,6 @@ measures tells by how much.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -20,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.mechanics.fe import Discretisation, Model, Options, Solution
-from rig.mechanics.fe.model import Item
 from rig.mechanics.simulate.bending import BendingModel
 from rig.mechanics.simulate.shape import BendingShape
+from rig.mechanics.simulate.solids import Items
 from rig.spec.material import MaterialSpec
 
 Array = NDArray[np.float64]
@@ -77,7 +76,7 @@ class BuildBending(Protocol):
         material: MaterialSpec,
         /,
         *,
-        items: Callable[[Discretisation, BendingShape], Sequence[Item]],
+        items: Items,
         arc: bool,
     ) -> BendingModel:
         """The model with `items`, whose steps follow the cap's rotation if `arc` says so."""

@@ -43,6 +43,7 @@ from rig.mechanics.mesh.bellow_axisymmetric import (
 )
 from rig.mechanics.simulate.axisymmetric import AxisymmetricModel, axisymmetric_model
 from rig.mechanics.simulate.energies import mixed_energies
+from rig.mechanics.simulate.meridian import supports_of
 from rig.spec.actuator import BellowGripperGeometry
 from rig.spec.material import MaterialSpec
 
@@ -120,10 +121,7 @@ def _whole(geometry: BellowGripperGeometry, material: MaterialSpec) -> GripModel
     model = Model(
         d,
         [Solid(d, *mixed_energies(material))],
-        supports=[
-            Support.of(d, d.nodes_on("clamped"), (0, 1)),
-            Support.of(d, d.nodes_on("axis"), (0,)),
-        ],
+        supports=supports_of(d),
         surface=PressureSurface(d, d.facets_on("cavity")),
         items=[contact],
     )

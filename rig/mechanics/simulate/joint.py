@@ -7,7 +7,6 @@ frame and, on a disc, no stress that reaches the bellows. Flanks that touch are 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -28,6 +27,7 @@ from rig.mechanics.fe import (
 from rig.mechanics.mesh.bellow_joint import JointBellow, JointResolution, mesh_joint_bellow
 from rig.mechanics.simulate.energies import mixed_energies
 from rig.mechanics.simulate.flanks import Flanks
+from rig.mechanics.simulate.meridian import MeridianModel, supports_of
 from rig.spec.actuator import BellowJointGeometry
 from rig.spec.material import MaterialSpec
 
@@ -36,23 +36,10 @@ Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class JointModel:
+class JointModel(MeridianModel):
     """The whole bellow, with what turns its state into elongation and points of interest."""
 
-    model: Model
-    soft: Solid
     shape: JointBellow
-    density: float
-    """Of the material in kg/m3."""
-    acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """No weight."""
-    mirror: None = None
-    """Nothing is mirrored."""
-
-    @property
-    def planes(self) -> Mapping[str, int]:
-        """The axis, and the component of displacement that it holds."""
-        return {"axis": 0}
 
     @cached_property
     def top(self) -> int:
@@ -94,10 +81,7 @@ def joint_model(
     body = mesh_joint_bellow(shape, resolution)
     d = discretise(body.mesh, Kinematics.AXISYMMETRIC)
     soft = Solid(d, *mixed_energies(material))
-    supports = [
-        Support.of(d, d.nodes_on("clamped"), (0, 1)),
-        Support.of(d, d.nodes_on("axis"), (0,)),
-    ]
+    supports = supports_of(d)
     if moved:
         supports.append(Support.of(d, d.nodes_on("top"), (1,), 1.0))
     model = Model(
@@ -107,7 +91,7 @@ def joint_model(
         # the volume is the same from anywhere: the cavity is closed
         surface=PressureSurface(d, d.facets_on("cavity")),
     )
-    return JointModel(model, soft, shape, material.density.value)
+    return JointModel(model, soft, material.density.value, shape)
 
 
 def nodes_at(discretisation: Discretisation, places: Array) -> Integers:

@@ -2,29 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from rig.mechanics.fe import (
-    Discretisation,
-    Model,
-    PressureSurface,
-    RigidBody,
-    Solid,
-    Support,
-    discretise,
-)
+from rig.mechanics.fe import Discretisation
 from rig.mechanics.fe.sliding import Sliding
-from rig.mechanics.hyperelastic import (
-    NeoHookean,
-    QuadraticVolume,
-    bulk_modulus_from,
-    shear_modulus_from,
-)
-from rig.mechanics.mesh.slit_shell import ShellResolution, mesh_slit_shell
+from rig.mechanics.mesh.slit_shell import ShellResolution, SlitShellMesh, mesh_slit_shell
 from rig.mechanics.shells import SlitShell
-from rig.mechanics.simulate.bending import BendingModel, Layer, bending_model_on
-from rig.mechanics.simulate.chambers import Items, LinearChamberModel
-from rig.mechanics.simulate.energies import mixed_energies
+from rig.mechanics.simulate.bending import BendingModel, bending_model_on
+from rig.mechanics.simulate.linear import LinearModel, linear_model_on
+from rig.mechanics.simulate.solids import Items, Layer
 from rig.spec.material import MaterialSpec
 from rig.spec.shells import (
     ShellReinforcedBendingGeometry,
@@ -55,12 +39,11 @@ def shell_bending_model(
     Without weight, which bends it by 1 deg where it hangs: at rest nothing but the strip would hold
     the rings, and contact would begin open.
     """
-    shape = SlitShell.of(geometry)
-    body = mesh_slit_shell(shape, resolution)
+    body = mesh_slit_shell(SlitShell.of(geometry), resolution)
     return bending_model_on(
         body,
         material,
-        layer=Layer(body.shell, *_film(geometry)),
+        layer=_film(geometry, body),
         items=items,
         interfaces=lambda d: [_sliding(d, geometry, material)],
         acceleration=(0.0, 0.0, 0.0),
@@ -68,11 +51,8 @@ def shell_bending_model(
     )
 
 
-def _film(geometry: ShellReinforcedGeometry) -> tuple[NeoHookean, QuadraticVolume]:
-    constants = geometry.shell_modulus, geometry.shell_poisson_ratio
-    return NeoHookean(shear_modulus_from(*constants)), QuadraticVolume(
-        bulk_modulus_from(*constants)
-    )
+def _film(geometry: ShellReinforcedGeometry, body: SlitShellMesh) -> Layer:
+    return Layer.elastic(body.shell, geometry.shell_modulus, geometry.shell_poisson_ratio)
 
 
 def _sliding(
@@ -94,26 +74,12 @@ def _sliding(
 
 def shell_linear_model(
     geometry: ShellReinforcedLinearGeometry, material: MaterialSpec, *, resolution: ShellResolution
-) -> LinearChamberModel:
+) -> LinearModel:
     """A core in a shell that slides all round; without weight, its cap free along the axis."""
-    shape = SlitShell.of(geometry)
-    body = mesh_slit_shell(shape, resolution, quarter=True)
-    d = discretise(body.mesh)
-    core = Solid(
-        d,
-        *mixed_energies(material),
-        elements=np.setdiff1d(np.arange(len(d.connectivity)), body.shell),
+    body = mesh_slit_shell(SlitShell.of(geometry), resolution, quarter=True)
+    return linear_model_on(
+        body,
+        material,
+        layer=_film(geometry, body),
+        interfaces=lambda d: [_sliding(d, geometry, material)],
     )
-    model = Model(
-        d,
-        [core, Solid(d, *_film(geometry), elements=body.shell)],
-        supports=[
-            Support.of(d, d.nodes_on("clamped"), (0, 1, 2)),
-            Support.of(d, d.nodes_on("symmetry"), (1,)),
-            Support.of(d, d.nodes_on("floor"), (2,)),
-        ],
-        surface=PressureSurface(d, d.facets_on("cavity")),
-        bodies=[RigidBody(d, d.nodes_on("cap"), free=("x",), centre=shape.cap_centre)],
-        interfaces=[_sliding(d, geometry, material)],
-    )
-    return LinearChamberModel(model, material.density.value)
