@@ -31,6 +31,8 @@ pytest.importorskip("foxglove", reason="the server needs rig[watch]")
 websockets = pytest.importorskip("websockets.sync.client")
 
 Message = tuple[str, int, bytes]
+UNKNOWN = "Unknown channel ID: "
+"""What foxglove-sdk answers to a subscription to a channel that it does not know yet."""
 
 
 class Client:
@@ -54,9 +56,9 @@ class Client:
                 self.received.append((self._topics[subscription], time_ns, frame[13:]))
 
     def _answer(self, said: dict[str, object]) -> None:
-        if said["op"] == "status" and "unknown channel" in str(said):
+        if said["op"] == "status" and str(said["message"]).startswith(UNKNOWN):
             # the server of a busy machine tells of a channel a moment before it knows it itself
-            self._subscribe(self._topics)
+            self._subscribe([int(str(said["message"]).removeprefix(UNKNOWN))])
         if said["op"] != "advertise":
             return
         for channel in said["channels"]:
@@ -175,6 +177,17 @@ def last_seen_s(follower: LogFollower) -> float:
         for channel, time_ns, _ in follower.messages(chunk)
         if channel.topic == topic
     )
+
+
+def test_a_subscription_to_a_channel_that_is_not_there_yet_is_answered_so() -> None:
+    with (
+        LiveServer(0) as server,
+        websockets.connect(server.url, subprotocols=["foxglove.sdk.v1"]) as socket,
+    ):
+        early = {"op": "subscribe", "subscriptions": [{"id": 10, "channelId": 10}]}
+        socket.send(json.dumps(early))
+        assert json.loads(socket.recv(timeout=30))["op"] == "serverInfo"
+        assert json.loads(socket.recv(timeout=30))["message"] == f"{UNKNOWN}10"
 
 
 @pytest.mark.parametrize("hesitates_s", [0.0, 0.1])
