@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from rig.mechanics.job import Job
 from rig.mechanics.response import interpolated
-from rig.mechanics.simulate.prediction import blocked_inflation, free_inflation
+from rig.mechanics.simulate.prediction import inflations
 from rig.plant.errors import SpecimenError
 from rig.plant.truth_tables import TruthTables
 from rig.spec.actuator import ActuatorSpec
@@ -45,14 +45,12 @@ def finite_element_truth(
     scaled = printed.model_copy(
         update={"limits": printed.limits.model_copy(update={"pressure": limit})}
     )
-    free = free_inflation(scaled, lighter, specimen=True).curves(limit, job)
-    held = blocked_inflation(scaled, lighter, specimen=True)
-    if held is None:
+    free, blocked = inflations(scaled, lighter, limit, job, specimen=True)
+    if blocked is None:
         raise SpecimenError(
             f"The tip of '{printed.name}' cannot be blocked: its family has no such model, so the "
             "virtual bench has nothing for the load cell; use another actuator family."
         )
-    blocked = held.curves(limit, job)
     for what, curves in (("tip free", free), ("tip blocked", blocked)):
         if curves.cancelled or curves.pressure.size < _LEAST_RUNGS:
             raise SpecimenError(

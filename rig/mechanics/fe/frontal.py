@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import ctypes
 import functools
-import os
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,6 +25,7 @@ from rig.mechanics.fe._native import ffi, lib
 from rig.mechanics.fe.discretisation import Integers
 from rig.mechanics.fe.errors import SingularError
 from rig.mechanics.fe.pointers import flags, ints, longs, reals
+from rig.mechanics.fe.threads import available_threads
 
 Array = NDArray[np.float64]
 Int32s = NDArray[np.int32]
@@ -45,8 +45,8 @@ class Multifrontal:
     name = "multifrontal"
 
     def __init__(self, threads: int | None = None) -> None:
-        """On `threads` threads, or as many as there are processors, up to four."""
-        self._threads = threads or min(os.cpu_count() or 1, _MAX_THREADS)
+        """On `threads` threads, or as many as there are to be had, up to four."""
+        self._threads = threads
         self._pattern: tuple[Int32s, Int32s] | None = None
         self._tree: _Tree | None = None
         self._memory = np.zeros(0)
@@ -64,7 +64,8 @@ class Multifrontal:
             self._pattern = (matrix.indptr.copy(), matrix.indices.copy())
             # touching new memory would cost a fifth of the time
             self._memory = np.empty(self._tree.panel[-1])
-        return MultifrontalFactor(self._tree, matrix, self._memory, self._threads)
+        threads = self._threads or min(available_threads(), _MAX_THREADS)
+        return MultifrontalFactor(self._tree, matrix, self._memory, threads)
 
 
 class MultifrontalFactor:

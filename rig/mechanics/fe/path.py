@@ -6,14 +6,12 @@ succeeds easily lets the next grow. A path that cannot be finished keeps what it
 
 from __future__ import annotations
 
-import functools
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import ThreadpoolController
 
 from rig.mechanics.fe.control import Control, PressureControl, Situation
 from rig.mechanics.fe.coordinates import blend
@@ -21,6 +19,7 @@ from rig.mechanics.fe.linear import LinearSolver, default_solver
 from rig.mechanics.fe.model import Assembly, Model
 from rig.mechanics.fe.newton import Clock, Iteration, Options, Outcome, Target, solve_step
 from rig.mechanics.fe.state import State
+from rig.mechanics.fe.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 
@@ -147,7 +146,7 @@ def follow(
     state = start or model.start()
     solutions: list[Solution] = []
     failure = None
-    with _blas().limit(limits=1, user_api="blas"):
+    with one_blas_thread():
         for index, point in enumerate(points):
             told = _teller(progress, index, len(points))
             arrived = run.go(state, point, index, told)
@@ -164,13 +163,6 @@ def follow(
         cancelled=run.cancelled,
         solver=run.solver.name,
     )
-
-
-@functools.cache
-def _blas() -> ThreadpoolController:
-    """The BLAS libraries of NumPy and SciPy. Elements and fronts are shared among threads here;
-    more threads inside their small matrices would only fight with these."""
-    return ThreadpoolController()
 
 
 class _Run:

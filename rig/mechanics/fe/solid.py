@@ -17,7 +17,6 @@ shells cost a fraction of the iterations. Both agree at convergence.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -30,6 +29,7 @@ from rig.mechanics.fe._native import ffi, lib
 from rig.mechanics.fe.discretisation import Discretisation, Integers
 from rig.mechanics.fe.pointers import reals
 from rig.mechanics.fe.state import PointState
+from rig.mechanics.fe.threads import available_threads
 from rig.mechanics.hyperelastic import Energy, Flowing, Hyperelastic, Volumetric
 from rig.mechanics.hyperelastic.tensors import (
     add_cofactor_slope,
@@ -452,7 +452,7 @@ class _Store:
 
 
 def _in_parallel(work: Callable[[slice], _T], chunks: list[slice]) -> list[_T]:
-    workers = min(len(chunks), os.cpu_count() or 1, _MAX_WORKERS)
+    workers = min(len(chunks), available_threads(), _MAX_WORKERS)
     if workers == 1:
         return [work(chunk) for chunk in chunks]
     with ThreadPoolExecutor(workers) as pool:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
 from rig.mechanics.errors import MechanicsError
+from rig.mechanics.fe.threads import side_by_side
 from rig.mechanics.hyperelastic.stability import material_stability
-from rig.mechanics.job import Job
+from rig.mechanics.job import Job, SharedWatch
 from rig.mechanics.response import Response, interpolated
 from rig.mechanics.simulate.families import FAMILIES, Meshing
 from rig.mechanics.simulate.inflation import Curves, Inflation
@@ -76,6 +80,28 @@ def _key(experiment: str, actuator: ActuatorSpec, material: MaterialSpec, specim
     )
 
 
+def inflations(
+    actuator: ActuatorSpec,
+    material: MaterialSpec,
+    top: float,
+    job: Job,
+    *,
+    specimen: bool = False,
+) -> tuple[Curves, Curves | None]:
+    """Curves up to `top` in Pa with the tip free, and blocked where the family has that.
+
+    Both are computed at once where there is more than one thread.
+    """
+    questions = [free_inflation(actuator, material, specimen=specimen)]
+    held = blocked_inflation(actuator, material, specimen=specimen)
+    if held is not None:
+        questions.append(held)
+    shared = SharedWatch(job.watch)
+    beside = replace(job, watch=shared)
+    curves = side_by_side([partial(q.curves, top, beside) for q in questions], shared.stop)
+    return curves[0], curves[1] if held is not None else None
+
+
 def finite_element_response(
     actuator: ActuatorSpec, material: MaterialSpec, pressures: Array, job: Job
 ) -> Response:
@@ -86,9 +112,7 @@ def finite_element_response(
     reached none.
     """
     top = float(pressures[-1])
-    free = free_inflation(actuator, material).curves(top, job)
-    held = blocked_inflation(actuator, material)
-    blocked = held.curves(top, job) if held is not None else None
+    free, blocked = inflations(actuator, material, top, job)
     answers = [("tip free", free)] + ([("tip blocked", blocked)] if blocked is not None else [])
     for name, curves in answers:
         if not curves.pressure.size:
