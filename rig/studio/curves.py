@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,9 +92,17 @@ class Beam:
             profile=side_profile(self.geometry, angle),
         )
 
+    @cached_property
     def window(self) -> Box:
         """What the side view fills between rest and the highest pressure."""
-        return _window(self.geometry, np.radians(self.bent(self.top_pressure).angle_deg))
+        angle = np.radians(self.bent(self.top_pressure).angle_deg)
+        return box_of(
+            [
+                shape
+                for part in np.linspace(0.0, angle, 7)
+                for shape in profile_shapes(side_profile(self.geometry, float(part)))
+            ]
+        )
 
     @property
     def mass_g(self) -> float:
@@ -119,13 +127,3 @@ class Bent:
             f"{self.pressure_kpa:.2f} kPa: bends by {self.angle_deg:.1f} deg, presses with "
             f"{self.force_g:.1f} g when blocked, holds {self.volume_ml:.2f} mL"
         )
-
-
-@lru_cache(maxsize=32)
-def _window(geometry: BellowBendingGeometry, angle: float) -> Box:
-    shapes = [
-        shape
-        for part in np.linspace(0.0, angle, 7)
-        for shape in profile_shapes(side_profile(geometry, float(part)))
-    ]
-    return box_of(shapes)

@@ -38,6 +38,7 @@ from rig.studio.seat import PATIENCE_S, Seat
 from rig.studio.watched import Glances, Pace, WatchedBench
 from rig.vision.measure import AngleMeter
 
+Ask = Literal["take", "give", "connect", "disconnect", "order", "answer"]
 Opcode = Literal["home", "zero_pressure", "tare", "jog", "set_pressure", "hold", "clear_fault"]
 
 POLL_S = 0.02
@@ -126,6 +127,20 @@ class Desk:
         """Whether a bench is connected, or being so."""
         return self._thread is not None and self._thread.is_alive()
 
+    def open_to(self, session: str) -> list[Ask]:
+        """What this browser may ask for now; `order` stands for a run as well.
+
+        Control may be asked for even while another has it: that finds out whether it is gone.
+        """
+        if self.seat.holder != session:
+            return ["take"]
+        asks: list[Ask] = ["give", "disconnect" if self.is_open else "connect"]
+        if self.is_open and not self._busy_with:
+            asks.append("order")
+        if self.activity.question:
+            asks.append("answer")
+        return asks
+
     def take_control(self, session: str) -> None:
         """Sit down at the bench; raises StudioError while another session sits there."""
         self._miss_the_lost()  # without a bench nobody else looks who is gone
@@ -212,8 +227,15 @@ class Desk:
     def _require_free(self) -> None:
         if not self.is_open:
             raise StudioError("no bench is connected.")
-        if self.activity.total or self.activity.doing:
-            raise StudioError("the bench is busy: wait, or press Vent.")
+        if self._busy_with:
+            raise StudioError(
+                f"the bench is busy ({self._busy_with}): wait, or press Vent and stop."
+            )
+
+    @property
+    def _busy_with(self) -> str:
+        """Empty while the bench waits for orders."""
+        return self.activity.doing or ("a run" if self.activity.total else "")
 
     def _setup_of(self, choice: Choice, protocol: str) -> Setup:
         for kind, name in (("actuator", choice.actuator), ("bench", choice.bench)):
@@ -273,6 +295,7 @@ class Desk:
                     self._carry_out(link, "vent")
                 order = self._next_order()
                 if isinstance(order, _Take):
+                    self._say(doing="closing the bench before the run")
                     return order
                 if order is not None:
                     self._carry_out(link, order.opcode, order.argument)

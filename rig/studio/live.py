@@ -104,6 +104,7 @@ def message(desk: Desk, session: str, watch: bool, number: int) -> tuple[str, in
         "total": activity.total,
         "said": activity.said,
         "question": activity.question,
+        "may": desk.open_to(session),
         "control": "free" if holder is None else "yours" if holder == session else "another's",
         "samples": [[round(value, 3) for value in sample[1:]] for sample in samples],
     }

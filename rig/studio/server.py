@@ -6,11 +6,12 @@ import contextlib
 
 from fastapi import FastAPI
 from nicegui import core, ui
+from starlette.middleware.gzip import GZipMiddleware
 from starlette.types import ASGIApp
 
 from rig.errors import RigError
 from rig.spec.workspace import Workspace
-from rig.studio.access import Access
+from rig.studio.access import Access, is_loopback
 from rig.studio.curves import Beam
 from rig.studio.design import check, open_draft
 from rig.studio.drawing import section_svg
@@ -44,6 +45,8 @@ def application(studio: Studio, access: Access) -> ASGIApp:
         tailwind=False,
         message_history_length=KEPT_MESSAGES,
         show_welcome_message=False,
+        # packing costs more than the way within this computer
+        gzip_middleware_factory=None if is_loopback(access.host) else GZipMiddleware,
     )
     return Gate(app, access)
 

@@ -93,7 +93,9 @@ def _pages() -> None:
             page.get_by_text("This is a sound design.").wait_for()
             seen_s = float(page.evaluate("performance.now()")) / 1e3
             visits.append((seen_s, _cpu_s(pid) - cpu_s, _spent_s(session)))
+        cpu_s, spent_s = _cpu_s(pid), _spent_s(session)
         moves = page.evaluate(MOVES)
+        each = (_cpu_s(pid) - cpu_s) / len(moves), (_spent_s(session) - spent_s) / len(moves)
         browser.close()
     warm = np.median(visits[1:], axis=0)
     print("first page   shown after   server CPU   browser CPU")
@@ -101,7 +103,8 @@ def _pages() -> None:
         print(f"{name:10s}  {seen:10.2f} s  {server:9.2f} s  {script:10.2f} s")
     print(
         f"slider to redraw: median {np.median(moves):.0f} ms, 95 % {np.quantile(moves, 0.95):.0f} "
-        f"ms of {len(moves)}; load of the machine {os.getloadavg()[0]:.1f}"
+        f"ms of {len(moves)}; CPU of each {1e3 * each[0]:.0f} ms in the server, "
+        f"{1e3 * each[1]:.0f} ms in the browser; load of the machine {os.getloadavg()[0]:.1f}"
     )
 
 

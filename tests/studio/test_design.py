@@ -207,7 +207,7 @@ def test_the_window_holds_every_shape_of_the_slider() -> None:
     spec, material = LIBRARY.actuator("bellow-bending"), LIBRARY.material("agilus30")
     beam = Beam.of(spec, material)
     assert beam is not None
-    left, bottom, right, top = beam.window()
+    left, bottom, right, top = beam.window
     for pressure in np.linspace(0, beam.top_pressure, 9):
         bent = beam.bent(float(pressure))
         points = 1e3 * np.concatenate([bent.profile.bellow, bent.profile.end_cap])
@@ -215,7 +215,7 @@ def test_the_window_holds_every_shape_of_the_slider() -> None:
         assert points[:, 0].max() < right
         assert points[:, 1].min() > bottom
         assert points[:, 1].max() < top
-        assert profile_svg(bent.profile, beam.window(), bent.words).count("<polygon") == 4
+        assert profile_svg(bent.profile, beam.window, bent.words).count("<polygon") == 4
 
 
 def test_a_family_without_beam_theory_has_none() -> None:

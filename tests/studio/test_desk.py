@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from fastapi import FastAPI
@@ -20,7 +22,7 @@ from rig.experiment.request import make_request
 from rig.experiment.run import new_run
 from rig.link.client import RigLink
 from rig.record.reader import RunReader
-from rig.studio.desk import LOST, Choice, Desk
+from rig.studio.desk import LOST, Choice, Desk, _Take
 from rig.studio.errors import StudioError
 from rig.studio.live import live_route, message
 from rig.studio.seat import PATIENCE_S, Seat
@@ -272,11 +274,18 @@ def test_what_is_asked_for_while_a_run_begins_is_not_done_after_it(
     desk: Desk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     left: list[int] = []
-    let_go = desk._let_go
+    next_order, let_go = desk._next_order, desk._let_go
+
+    def pressed_at_the_same_time() -> object:
+        order = next_order()
+        if isinstance(order, _Take):
+            desk.order("me", "set_pressure", 4.0)
+        return order
 
     def pressed_once_more(link: RigLink, bench: Bench) -> None:
         monkeypatch.undo()
-        desk.order("me", "set_pressure", 4.0)
+        with pytest.raises(StudioError, match=r"busy \(closing the bench before the run\)"):
+            desk.order("me", "set_pressure", 4.0)
         let_go(link, bench)
 
     def refuse(_folder: Path) -> None:
@@ -285,6 +294,7 @@ def test_what_is_asked_for_while_a_run_begins_is_not_done_after_it(
 
     desk.after_run = refuse
     connected(desk, replace(BEAM, speed=0.0))
+    monkeypatch.setattr(desk, "_next_order", pressed_at_the_same_time)
     monkeypatch.setattr(desk, "_let_go", pressed_once_more)
     desk.take("me", "tiny")
     until(lambda: "Its report was not begun: enough" in desk.activity.said)
@@ -322,6 +332,38 @@ def test_the_live_message_tells_who_controls_and_only_new_samples(desk: Desk) ->
     assert len(json.loads(again)["samples"]) < len(first["samples"])
     quiet, _ = message(desk, "other", False, 0)
     assert json.loads(quiet)["samples"] == []
+
+
+def test_a_browser_is_told_what_it_may_ask_for(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    def may(session: str) -> set[str]:
+        return set(json.loads(message(desk, session, True, 0)[0])["may"])
+
+    opening = threading.Event()
+    go_on = threading.Event()
+    open_bench = desk._open
+
+    def opened(*arguments: Any) -> Bench:
+        opening.set()
+        assert go_on.wait(PATIENT_S)
+        return open_bench(*arguments)
+
+    monkeypatch.setattr(desk, "_open", opened)
+    assert may("me") == may("other") == {"take"}
+    desk.take_control("me")
+    assert may("me") == {"give", "connect"}
+    assert may("other") == {"take"}
+    desk.connect("me", replace(BEAM, speed=0.0))
+    assert opening.wait(PATIENT_S)
+    assert may("me") == {"give", "disconnect"}
+    with pytest.raises(StudioError, match=r"busy \(opening the bench\)"):
+        desk.take("me", "tiny")
+    go_on.set()
+    until(lambda: "order" in may("me"))
+    desk.take("me", "tiny")  # as soon as it may be asked for it is begun
+    until(lambda: desk.activity.total == 2)
+    assert may("me") == {"give", "disconnect"}
+    desk._say(question="turn the valve")
+    assert may("me") == {"give", "disconnect", "answer"}
 
 
 def test_an_answer_keeps_the_seat_and_a_session_must_have_a_name(desk: Desk, clock: Clock) -> None:

@@ -8,7 +8,7 @@ from functools import partial
 from nicegui import ui
 
 from rig.errors import RigError
-from rig.studio.desk import JOG_ML_S, Choice, Opcode
+from rig.studio.desk import JOG_ML_S, Ask, Choice, Opcode
 from rig.studio.pages.frame import BENCH, frame, heading, number_of, say, text_of
 from rig.studio.state import Studio
 
@@ -68,8 +68,8 @@ class BenchPage:
             heading("Control")
             ui.html('<p>Control is <b data-live="control">unknown</b>.</p>', sanitize=False)
             with ui.row().classes("actions"):
-                self._button("Take control", self._desk.take_control, "main")
-                self._button("Give back", self._desk.release)
+                self._button("Take control", "take", self._desk.take_control, "main")
+                self._button("Give back", "give", self._desk.release)
             self._actuator = self._names("actuator")
             self._bench = self._names("bench")
             with ui.row().classes("actions"):
@@ -77,32 +77,33 @@ class BenchPage:
                 self._speed = ui.select(SPEEDS, value=1.0, label="speed")
                 self._speed.props("outlined dense")
             with ui.row().classes("actions"):
-                self._button("Connect", self._connect, "main")
-                self._button("Disconnect", self._desk.disconnect)
+                self._button("Connect", "connect", self._connect, "main")
+                self._button("Disconnect", "disconnect", self._desk.disconnect)
 
     def _orders(self) -> None:
         with ui.column().classes("panel"):
             heading("By hand")
             with ui.row().classes("actions"):
                 for label, opcode, argument in ORDERS:
-                    self._button(label, partial(self._desk.order, opcode=opcode, argument=argument))
+                    ask = partial(self._desk.order, opcode=opcode, argument=argument)
+                    self._button(label, "order", ask)
             with ui.row().classes("actions"):
                 self._target = ui.number("set-point (kPa)", value=5, min=0, step=0.5)
                 self._target.props("outlined dense")
-                self._button("Go", self._go, "main")
+                self._button("Go", "order", self._go, "main")
 
     def _protocol(self) -> None:
         with ui.column().classes("panel"):
             heading("Protocol")
             self._protocols = self._names("protocol")
-            self._button("Run", self._run, "main")
+            self._button("Run", "order", self._run, "main")
             ui.html(
                 '<progress data-live="progress" max="1" value="0" style="width:100%"></progress>'
                 '<p data-live="doing" role="status"></p>'
                 '<p class="caution" data-live="question" hidden></p>',
                 sanitize=False,
             )
-            self._button("Done as asked", self._desk.answer)
+            self._button("Done as asked", "answer", self._desk.answer)
 
     def _board(self) -> None:
         with ui.column().classes("panel"):
@@ -144,14 +145,20 @@ class BenchPage:
         first = FIRST[kind] if FIRST[kind] in names else None
         return ui.select(names, value=first, label=kind).props("outlined dense")
 
-    def _button(self, label: str, ask: Callable[[str], None], kind: str = "plain") -> None:
+    def _button(
+        self, label: str, needs: Ask, ask: Callable[[str], None], kind: str = "plain"
+    ) -> None:
+        """A button that the live connection opens while the desk is open to what it needs."""
+
         def pressed() -> None:
             try:
                 ask(self._client.tab_id or "")
             except RigError as error:
                 say(str(error), "negative")
 
-        ui.button(label, on_click=pressed, color=None).classes(kind).props("unelevated")
+        ui.button(label, on_click=pressed, color=None).classes(kind).props(
+            f'unelevated data-needs="{needs}"'
+        )
 
     # --- what happens ----------------------------------------------------------------------
 

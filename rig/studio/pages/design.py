@@ -12,7 +12,7 @@ from nicegui import events, ui
 from rig.errors import RigError
 from rig.mechanics.model import available_models
 from rig.studio.beside import Design, compared
-from rig.studio.charts import response_options
+from rig.studio.charts import moved, response_options
 from rig.studio.curves import Beam, Curve
 from rig.studio.design import (
     FAMILIES,
@@ -121,7 +121,7 @@ class DesignPage:
                 heading("Bent by beam theory")
                 self._bent = ui.html("", sanitize=False)
                 self._slider = ui.slider(
-                    min=0, max=SLIDER_STEPS, value=SLIDER_STEPS // 2, on_change=self._bend
+                    min=0, max=SLIDER_STEPS, value=SLIDER_STEPS // 2, on_change=self._slid
                 ).props('aria-label="pressure"')
                 self._figures = ui.label().classes("figures said").props('role="status"')
 
@@ -251,21 +251,31 @@ class DesignPage:
         except RigError as error:
             self._beam = self._curve = None
             say(str(error), "negative")
-        self._bend()
+        self._draw_responses()
         self._compare()
 
-    def _bend(self) -> None:
-        """Draw the actuator at the slider's pressure."""
+    def _draw_responses(self) -> None:
+        """Draw the actuator at the slider's pressure, and all curves."""
+        self._draw_curves(self._bend())
+
+    def _slid(self) -> None:
+        """The curves stay where they are: only their cursor moves, which browsers do at once."""
+        at_kpa = self._bend()
+        if at_kpa is not None:
+            for chart in (self._angle, self._force):
+                chart.run_chart_method("setOption", moved(at_kpa))
+
+    def _bend(self) -> float | None:
+        """Draw the actuator at the slider's pressure; tells it in kPa, None without a model."""
         beam = self._beam
         if beam is None:
             self._bent.content = ""
             self._figures.text = "Beam theory is for the bending bellow; compute finite elements."
-            self._draw_curves(None)
-            return
+            return None
         bent = beam.bent(beam.top_pressure * number_of(self._slider.value, 0.0) / SLIDER_STEPS)
-        self._bent.content = profile_svg(bent.profile, beam.window(), bent.words)
+        self._bent.content = profile_svg(bent.profile, beam.window, bent.words)
         self._figures.text = bent.words
-        self._draw_curves(bent.pressure_kpa)
+        return bent.pressure_kpa
 
     def _draw_curves(self, at_kpa: float | None) -> None:
         pinned = None if self._pinned is None else self._pinned.curve
@@ -307,12 +317,12 @@ class DesignPage:
             raise StudioError("there is no curve to pin yet: compute finite elements first.")
         label = f"{design.curve.label}, pinned"
         self._pinned = replace(design, curve=replace(design.curve, label=label))
-        self._bend()
+        self._draw_responses()
         self._compare()
 
     def _unpin(self) -> None:
         self._pinned = None
-        self._bend()
+        self._draw_responses()
         self._compare()
 
     def _compare(self) -> None:
@@ -368,5 +378,5 @@ class DesignPage:
         self._margin.content = f"<p>{html.escape(answer.margin)}</p>{cautions}"
         self._view.props(f'src="{self._studio.views.keep(answer.page)}"')
         self._view.set_visibility(True)
-        self._bend()
+        self._draw_responses()
         self._compare()

@@ -20,6 +20,7 @@ function studioLive(session, watch) {
   };
   socket.onclose = () => {
     tell("summary", "connection lost: a bench that this browser controls is vented");
+    allow([]);
     setTimeout(() => { if (live === socket) studioLive(session, watch); }, 1000);
   };
 }
@@ -37,10 +38,19 @@ function tellIfAny(name, text) {
   if (element) element.hidden = !text;
 }
 
+/* What cannot be asked for now has its button closed; the server refuses it as well. */
+function allow(asks) {
+  for (const button of document.querySelectorAll("[data-needs]")) {
+    const closed = !asks.includes(button.dataset.needs);
+    if (button.disabled !== closed) button.disabled = closed;
+  }
+}
+
 function showBench(news) {
   const fault = news.fault === "none" ? "" : `Fault ${news.fault.replaceAll("_", " ")}. ${news.hint}`;
   tell("summary", news.connected ? `${news.connected}: ${news.state}${fault ? ", fault" : ""}` : "");
   if (!shown("control")) return;
+  allow(news.may);
   tell("control", news.control);
   tell("state", news.connected ? news.state : "no bench");
   tell("flags", news.flags);
