@@ -15,11 +15,13 @@ from rig.mechanics.chambers import ChamberRow, Rectangle
 from rig.mechanics.mesh.bellow_axisymmetric import AxisymmetricBellow
 from rig.spec.actuator import BellowAxisymmetricGeometry
 from rig.spec.chambers import MultiChamberBendingGeometry, MultiChamberLinearGeometry
+from rig.spec.shells import ShellReinforcedBendingGeometry
 
 pytest.importorskip("manifold3d", reason="manifold3d is not installed")
 
 BENDING = MultiChamberBendingGeometry(family="multi-chamber-bending")
 LINEAR = MultiChamberLinearGeometry(family="multi-chamber-linear", chamber_number=2)
+SHELL = ShellReinforcedBendingGeometry(family="shell-reinforced-bending")
 AXISYMMETRIC = BellowAxisymmetricGeometry(family="bellow-axisymmetric", bellow_number=3)
 
 
@@ -36,15 +38,16 @@ def _box(piece: Solid) -> np.ndarray:
     return np.array([surface.min(axis=0), surface.max(axis=0)])
 
 
-@pytest.mark.parametrize("geometry", [BENDING, LINEAR, AXISYMMETRIC])
+@pytest.mark.parametrize("geometry", [BENDING, LINEAR, AXISYMMETRIC, SHELL])
 def test_pieces_are_printable(geometry) -> None:
     for piece in _moulds(geometry).values():
         assert is_watertight(printable(triangulate(piece, 2e-5)))
 
 
-def test_jaws_and_core_leave_the_casting_its_place() -> None:
-    soft = parts_of(AXISYMMETRIC)[0].solid
-    left = Combined((soft,), tuple(_moulds(AXISYMMETRIC).values()))
+@pytest.mark.parametrize("geometry", [AXISYMMETRIC, SHELL])
+def test_jaws_and_core_leave_the_casting_its_place(geometry) -> None:
+    soft = parts_of(geometry)[0].solid
+    left = Combined((soft,), tuple(_moulds(geometry).values()))
     assert _volume(left) == pytest.approx(_volume(soft), rel=1e-6)
 
 
@@ -96,6 +99,16 @@ def test_jaws_and_core_hold_an_axisymmetric_bellow() -> None:
     plate = float(np.prod(np.diff(base[:, :2], axis=0))) * WALL
     assert _volume(pieces["base"], 5e-6) - plate == pytest.approx(shape.cavity_volume, rel=1e-3)
     assert base[1, 2] == pytest.approx(shape.height - shape.wall)
+
+
+def test_jaws_and_pin_hold_the_core_of_a_slit_shell_and_no_drop_more() -> None:
+    pieces = _moulds(SHELL)
+    low, high = _box(pieces["lower-jaw"])[0], _box(pieces["upper-jaw"])[1]
+    assert high[0] - low[0] == pytest.approx(SHELL.total_length)
+    plate = Combined((box(Rectangle(high[1], low[2], high[2]), low[0] - WALL, low[0]),))
+    inside = float(np.prod(high - low)) + _volume(plate)
+    held = inside - sum(_volume(piece) for piece in pieces.values())
+    assert held == pytest.approx(_volume(parts_of(SHELL)[0].solid), rel=1e-9)
 
 
 def test_what_is_printed_has_no_mould(default_geometry) -> None:

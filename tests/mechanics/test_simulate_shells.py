@@ -18,7 +18,12 @@ from rig.mechanics.shells import SlitShell
 from rig.mechanics.simulate.bending import FREE_OPTIONS
 from rig.mechanics.simulate.blocked import Blocked
 from rig.mechanics.simulate.inflation import Inflation
-from rig.mechanics.simulate.shells import shell_bending_model, shell_linear_model
+from rig.mechanics.simulate.prediction import inflations
+from rig.mechanics.simulate.shells import (
+    BLOCKED_SHELL_OPTIONS,
+    shell_bending_model,
+    shell_linear_model,
+)
 from rig.mechanics.store import Remembering
 from rig.spec.shells import ShellReinforcedBendingGeometry, ShellReinforcedLinearGeometry
 from rig.spec.workspace import Workspace
@@ -83,7 +88,7 @@ def test_the_blocked_tip_presses_on_its_stop(ecoflex):
 
     build = Blocked(partial(shell_bending_model, resolution=COARSE))
     actuator = build(BENDING, ecoflex)
-    result = follow(actuator.model, [Point(0.0), Point(4e3)])
+    result = follow(actuator.model, [Point(0.0), Point(4e3)], options=BLOCKED_SHELL_OPTIONS)
     assert result.failure is None
     forces = [actuator.measures(s)["force"] for s in result.solutions]
     assert forces[1] > 10 * abs(forces[0])
@@ -131,3 +136,17 @@ def test_more_slits_strain_the_shell_less_for_the_same_stroke(ecoflex):
     (few, few_stroke), (many, many_stroke) = found
     # at one pressure it is about the same: with 21 slits it lengthens further
     assert many / many_stroke < 0.75 * few / few_stroke
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("specimen", [False, True])
+def test_the_default_that_bends_reaches_its_limit_free_and_blocked(specimen):
+    setup = Workspace.find().setup("shell-reinforced-bending")
+    limit = setup.actuator.limits.pressure
+    for curves in inflations(setup.actuator, setup.material, limit, Job(), specimen=specimen):
+        assert curves is not None
+        assert curves.stopped is None
+        assert curves.pressure[-1] == pytest.approx(limit)
+        driven = curves.measured.get("force", curves.measured["angle"])
+        assert np.all(np.diff(driven) > 0)
+        assert np.all(curves.measured.get("clearance", driven) > -1e-9)

@@ -7,21 +7,27 @@ carries half of the chambers, passages and inlet. A layer is cast in a tray of i
 Axisymmetric bellows are cast in one piece (Auysakul et al., Section 4.1, whose mould has five
 pieces): two jaws about the outside, a base with the core, poured from the top. Arcs bulge over the
 core's end: the casting is pulled off it.
+
+Cores of slit shells are cast in one piece, too (Agarwal et al., "Single step molding"): two jaws, a
+base that carries the chamber on a pin as thick as the inlet, poured where the tip will be. The
+casting stretches over the chamber's rod, twice the pin's width, when it is pulled off.
 """
 
 from __future__ import annotations
 
 from rig.mechanics.cad.construct import Combined, Line, Part, Revolved
 from rig.mechanics.cad.errors import CadError
-from rig.mechanics.cad.parts import box, cavities, scalloped
+from rig.mechanics.cad.parts import box, cavities, inlet_radius, rod, scalloped
 from rig.mechanics.chambers import ChamberRow, Rectangle
 from rig.mechanics.mesh.bellow_axisymmetric import AxisymmetricBellow
+from rig.mechanics.shells import SlitShell
 from rig.spec.actuator import (
     BellowAxisymmetricGeometry,
     BellowGripperGeometry,
     Geometry,
 )
 from rig.spec.chambers import MultiChamberBendingGeometry, MultiChamberLinearGeometry
+from rig.spec.shells import ShellReinforcedBendingGeometry, ShellReinforcedLinearGeometry
 
 WALL = 0.004
 """Thickness of every mould's walls and floors in m; a print's choice, no paper's."""
@@ -36,6 +42,8 @@ def moulds_of(geometry: Geometry) -> tuple[Part, ...]:
             return _jaws(AxisymmetricBellow.of(geometry))
         case BellowGripperGeometry():
             return moulds_of(geometry.finger)
+        case ShellReinforcedBendingGeometry() | ShellReinforcedLinearGeometry():
+            return _jaws_along_x(SlitShell.of(geometry))
         case _:
             raise CadError(
                 f"There is no mould for a {geometry.family}: it is printed, blown, or cast in a "
@@ -78,7 +86,6 @@ def _tray(row: ChamberRow, floor: float, rim: float, *, cores: bool) -> Combined
 
 
 def _jaws(shape: AxisymmetricBellow) -> tuple[Part, ...]:
-    reach = shape.radius + shape.sagitta + WALL
     # beyond both ends, so that no film is left there
     body = Revolved(
         (
@@ -96,10 +103,29 @@ def _jaws(shape: AxisymmetricBellow) -> tuple[Part, ...]:
         ),
         axis="z",
     )
+    reach = shape.radius + shape.sagitta + WALL
     side = Rectangle(reach, 0.0, shape.height)
     plate = Rectangle(reach, -WALL, 0.0)
     return (
         Part("left-jaw", Combined((box(side, -reach, 0.0),), (body,)), is_soft=False),
         Part("right-jaw", Combined((box(side, 0.0, reach),), (body,)), is_soft=False),
         Part("base", Combined((box(plate, -reach, reach), core)), is_soft=False),
+    )
+
+
+def _jaws_along_x(shape: SlitShell) -> tuple[Part, ...]:
+    low, high = shape.start - shape.end_length, shape.end + shape.end_length
+    # beyond both ends, so that no film is left there
+    body = rod(low - WALL, high + WALL, shape.core_radius)
+    pin = rod(low - WALL / 2, shape.start, inlet_radius(shape))
+    chamber = rod(shape.start, shape.end, shape.chamber_radius)
+    reach = shape.core_radius + WALL
+    plate = box(Rectangle(reach, -reach, reach), low - WALL, low)
+    halves = {"lower-jaw": (-reach, 0.0), "upper-jaw": (0.0, reach)}
+    return (
+        *(
+            Part(name, Combined((box(Rectangle(reach, *z), low, high),), (body,)), is_soft=False)
+            for name, z in halves.items()
+        ),
+        Part("base", Combined((plate, pin, chamber)), is_soft=False),
     )

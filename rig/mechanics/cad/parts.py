@@ -71,13 +71,13 @@ def bending_soft_body(shape: BellowShape, *, inlet: bool = True) -> Combined:
         Revolved(_bellow_profile(shape, 0.0)),
         Prism(_points(shape.channel_section), 0.0, length),
     )
-    holes = (_rod(-wall, 0.0, INLET_RADIUS),) if inlet else ()
+    holes = (rod(-wall, 0.0, INLET_RADIUS),) if inlet else ()
     return Combined(
         added=(
             Revolved(_bellow_profile(shape, wall)),
             Prism(_points(shape.solid_section), -wall, length + wall),
-            _rod(-wall, 0.0, shape.end_wall_top),
-            _rod(length, length + wall, shape.end_wall_top),
+            rod(-wall, 0.0, shape.end_wall_top),
+            rod(length, length + wall, shape.end_wall_top),
         ),
         removed=(*cavity, *holes),
     )
@@ -129,21 +129,26 @@ def box(section: Rectangle, start: float, end: float) -> Prism:
 def _shell_parts(shape: SlitShell) -> tuple[Part, ...]:
     low, high = shape.start - shape.end_length, shape.end + shape.end_length
     core = Combined(
-        (_rod(low, high, shape.core_radius),),
+        (rod(low, high, shape.core_radius),),
         (
-            _rod(shape.start, shape.end, shape.chamber_radius),
-            _rod(low, shape.start, min(INLET_RADIUS, shape.chamber_radius / 2)),
+            rod(shape.start, shape.end, shape.chamber_radius),
+            rod(low, shape.start, inlet_radius(shape)),
         ),
     )
     grip = Combined(
-        (_rod(shape.end, shape.tip, shape.radius),),
-        (_rod(shape.end, high, shape.core_radius),),
+        (rod(shape.end, shape.tip, shape.radius),),
+        (rod(shape.end, high, shape.core_radius),),
     )
     return (
         Part("soft", core, is_soft=True),
         Part("cap", grip, is_soft=False),
         Part("shell", slit_shell(shape), is_soft=False),
     )
+
+
+def inlet_radius(shape: SlitShell) -> float:
+    """Of the air inlet through the core's first solid end in m."""
+    return min(INLET_RADIUS, shape.chamber_radius / 2)
 
 
 def slit_shell(shape: SlitShell) -> Combined:
@@ -161,8 +166,8 @@ def slit_shell(shape: SlitShell) -> Combined:
             elif low == 0.0:
                 around = [(-high, high)]
             cuts += [_wedge(a, b, 2 * shape.radius, span.start, span.end) for a, b in around]
-    inside = _rod(shape.start, shape.end, shape.core_radius)
-    return Combined((_rod(shape.start, shape.end, shape.radius),), (inside, *cuts))
+    inside = rod(shape.start, shape.end, shape.core_radius)
+    return Combined((rod(shape.start, shape.end, shape.radius),), (inside, *cuts))
 
 
 def _wedge(low: float, high: float, reach: float, start: float, end: float) -> Prism:
@@ -230,18 +235,18 @@ def _connector(shape: BellowShape) -> Combined:
     side = shape.average_radius + 2 * shape.wall
     low, high = shape.underside, shape.end_wall_top + shape.wall
     plate = Prism(((-side, low), (side, low), (side, high), (-side, high)), near, far)
-    return Combined((plate,), (_rod(near, far, INLET_RADIUS),))
+    return Combined((plate,), (rod(near, far, INLET_RADIUS),))
 
 
 def _end_plate(shape: BellowShape, start: float) -> Combined:
     """The rigid end cap: outline of the end wall."""
     end = start + shape.cap_thickness
     section = Prism(_points(shape.solid_section), start, end)
-    return Combined((_rod(start, end, shape.end_wall_top), section))
+    return Combined((rod(start, end, shape.end_wall_top), section))
 
 
-def _rod(start: float, end: float, radius: float) -> Revolved:
-    """Cylinder about the x axis."""
+def rod(start: float, end: float, radius: float) -> Revolved:
+    """Cylinder about the x axis, from start to end in m."""
     return Revolved((Line((start, radius), (end, radius)),))
 
 

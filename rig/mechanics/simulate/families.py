@@ -22,7 +22,11 @@ from rig.mechanics.simulate.chambers import (
 from rig.mechanics.simulate.gripper import finger_model, grip_model
 from rig.mechanics.simulate.inflation import ActuatorModel
 from rig.mechanics.simulate.joint import joint_model
-from rig.mechanics.simulate.shells import shell_bending_model, shell_linear_model
+from rig.mechanics.simulate.shells import (
+    BLOCKED_SHELL_OPTIONS,
+    shell_bending_model,
+    shell_linear_model,
+)
 from rig.spec.material import MaterialSpec
 
 Build = Callable[[Any, MaterialSpec], ActuatorModel]
@@ -53,10 +57,10 @@ class Family:
     family that no bench measures yet."""
 
 
-def _bending(build: Any, resolution: object) -> Meshing:
+def _bending(build: Any, resolution: object, blocked: Options = BLOCKED_OPTIONS) -> Meshing:
     """Free and blocked models of what `build` makes at a resolution."""
     at_resolution = partial(build, resolution=resolution)
-    return Meshing(at_resolution, Blocked(at_resolution), FREE_OPTIONS, BLOCKED_OPTIONS)
+    return Meshing(at_resolution, Blocked(at_resolution), FREE_OPTIONS, blocked)
 
 
 _BENDING = BendingResolution(wall=1)
@@ -93,8 +97,8 @@ FAMILIES: dict[str, Family] = {
         model=Meshing(partial(multi_chamber_linear_model, resolution=_QUARTER))
     ),
     "shell-reinforced-bending": Family(
-        model=_bending(shell_bending_model, ShellResolution()),
-        specimen=_bending(shell_bending_model, _COARSE_SHELL),
+        model=_bending(shell_bending_model, ShellResolution(), BLOCKED_SHELL_OPTIONS),
+        specimen=_bending(shell_bending_model, _COARSE_SHELL, BLOCKED_SHELL_OPTIONS),
     ),
     "shell-reinforced-linear": Family(
         model=Meshing(partial(shell_linear_model, resolution=ShellResolution()))

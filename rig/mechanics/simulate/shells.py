@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rig.mechanics.fe import Discretisation
+from rig.mechanics.fe import Discretisation, Options
 from rig.mechanics.fe.sliding import Sliding
 from rig.mechanics.mesh.slit_shell import ShellResolution, SlitShellMesh, mesh_slit_shell
 from rig.mechanics.shells import SlitShell
@@ -24,6 +24,11 @@ _SLIP = 5e-5
 """What sticking points creep, metres: a tenth of how far the core slides under its rings."""
 _RIM = 2e-4
 """Over which pressure fades beyond a ring's edge, metres: twice the shell's thickness."""
+BLOCKED_SHELL_OPTIONS = Options(
+    correction=2e-5, iterations=8, first_step=0.35, least_step=1 / 32, alternate=False
+)
+"""Blocked, rings settle on the core up to a sixth of the pressure: steps that fail there need be
+shorter, more or plain iterations do not help."""
 
 
 def shell_bending_model(
