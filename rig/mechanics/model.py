@@ -22,12 +22,13 @@ from rig.spec.actuator import ActuatorSpec
 from rig.spec.material import MaterialSpec
 
 Array = NDArray[np.float64]
-Predictor = Callable[[ActuatorSpec, MaterialSpec, Array, Job], Response]
-"""Actuator, material, pressures in Pa and how to carry it out, to the response."""
+Predictor = Callable[[ActuatorSpec, MaterialSpec, Array, Job, bool], Response]
+"""Actuator, material, pressures in Pa, how to carry it out and whether the blocked force is wanted,
+to the response."""
 
 
 def beam_of_bending_bellow(
-    actuator: ActuatorSpec, material: MaterialSpec, pressures: Array, _job: Job
+    actuator: ActuatorSpec, material: MaterialSpec, pressures: Array, _job: Job, _blocked: bool
 ) -> Response:
     """Beam theory of the paper with our blocked force; MechanicsError where geometry runs out."""
     geometry = bending_geometry(actuator, "Beam theory")
@@ -53,12 +54,12 @@ def beam_of_bending_bellow(
 
 
 def finite_elements(
-    actuator: ActuatorSpec, material: MaterialSpec, pressures: Array, job: Job
+    actuator: ActuatorSpec, material: MaterialSpec, pressures: Array, job: Job, blocked: bool
 ) -> Response:
     """The family's finite element model; not a number beyond the pressure that it reached."""
     from rig.mechanics.simulate.prediction import finite_element_response
 
-    return finite_element_response(actuator, material, pressures, job)
+    return finite_element_response(actuator, material, pressures, job, blocked=blocked)
 
 
 _PREDICTORS: dict[tuple[str, str], Predictor] = {
@@ -86,10 +87,13 @@ def predict(
     model: str,
     pressures: ArrayLike,
     job: Job | None = None,
+    *,
+    blocked: bool = True,
 ) -> Response:
     """Response of `actuator` made of `material` at gauge `pressures` in Pa, (n,), ascending.
 
-    `job` says where long calculations keep their results and who watches them.
+    `job` says where long calculations keep their results and who watches them. Without `blocked`
+    the blocked force is left out where it would take a calculation of its own.
 
     Raises MechanicsError for a model this version does not have, pressures that are not finite,
     negative or not ascending, above the actuator's limit, or beyond the model's range.
@@ -101,7 +105,7 @@ def predict(
             f"there is no model '{model}' for the family '{family}'; this version has: "
             f"{', '.join(available_models(family)) or 'none'}."
         )
-    return predictor(actuator, material, _checked(actuator, pressures), job or Job())
+    return predictor(actuator, material, _checked(actuator, pressures), job or Job(), blocked)
 
 
 def _checked(actuator: ActuatorSpec, pressures: ArrayLike) -> Array:

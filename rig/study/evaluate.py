@@ -35,6 +35,7 @@ def _of_model(task: Task, model: str, responses: list[StudyResponse]) -> dict[st
         model,
         [one.pressure for one in responses],
         Job(FolderStore.of_user()),
+        blocked=any(one.quantity == "blocked_force" for one in responses),
     )
     values = {}
     for one in responses:

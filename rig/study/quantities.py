@@ -58,7 +58,11 @@ class Asked:
         model: str,
         pressures: list[float],
         job: Job,
+        *,
+        blocked: bool = True,
     ) -> None:
+        """`blocked` tells whether the blocked force is among what will be asked for."""
+        self.blocked = blocked
         self.actuator, self.material, self.model, self.job = actuator, material, model, job
         self.pressures = np.array(sorted({0.0, *pressures}))
         self._response: Response | None = None
@@ -82,7 +86,12 @@ class Asked:
         """At all pressures, rest included."""
         if self._response is None:
             self._response = predict(
-                self.actuator, self.material, self.model, self.pressures, self.job
+                self.actuator,
+                self.material,
+                self.model,
+                self.pressures,
+                self.job,
+                blocked=self.blocked,
             )
         return self._response
 

@@ -15,14 +15,18 @@ from rig.errors import RigError
 from rig.mechanics.beam import BeamTheory
 from rig.mechanics.bellow import BellowShape
 from rig.mechanics.job import Job
+from rig.mechanics.simulate.families import FAMILIES, Family, Meshing
 from rig.mechanics.store import FolderStore
 from rig.spec.actuator import BellowBendingGeometry
 from rig.spec.errors import SpecError
 from rig.spec.loading import parse
-from rig.spec.study import StudySpec
+from rig.spec.study import StudyResponse, StudySpec
 from rig.study import quantities
 from rig.study.errors import StudyError
+from rig.study.evaluate import evaluate
+from rig.study.plan import Task
 from rig.study.quantities import Asked, tip
+from tests.mechanics.test_simulate_inflation import BendingTube, tube
 
 ACTUATOR, MATERIAL = LIBRARY.actuator("bellow-bending"), LIBRARY.material("agilus30")
 
@@ -115,3 +119,23 @@ def test_what_a_model_cannot_tell_is_refused(response: str, words: str) -> None:
     )
     with pytest.raises(SpecError, match=words):
         parse(text, Path("study.yaml"), StudySpec)
+
+
+@pytest.mark.parametrize("quantity", ["angle", "blocked_force"])
+def test_the_tip_is_blocked_only_where_its_force_is_asked_for(
+    quantity: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    built = []
+
+    def held(geometry: object, material: object) -> BendingTube:
+        built.append("blocked")
+        return tube(geometry, material)
+
+    monkeypatch.setitem(FAMILIES, "bellow-bending", Family(Meshing(tube, held)))
+    monkeypatch.setenv("RIG_CACHE_DIR", str(tmp_path))
+    wanted = StudyResponse.model_validate(
+        {"name": "wanted", "quantity": quantity, "model": "fe", "pressure": "1 kPa"}
+    )
+    values = evaluate(Task("one", ACTUATOR, MATERIAL, (wanted,), None))
+    assert values["wanted"] > 0
+    assert built == (["blocked"] if quantity == "blocked_force" else [])

@@ -103,17 +103,26 @@ def inflations(
 
 
 def finite_element_response(
-    actuator: ActuatorSpec, material: MaterialSpec, pressures: Array, job: Job
+    actuator: ActuatorSpec,
+    material: MaterialSpec,
+    pressures: Array,
+    job: Job,
+    *,
+    blocked: bool = True,
 ) -> Response:
-    """The response at `pressures` in Pa, (n,), ascending.
+    """The response at `pressures` in Pa, (n,), ascending; its blocked force only with `blocked`.
 
     The blocked force is that beyond the hanging weight's, which is there without pressure. Not a
     number beyond the pressures that the calculations reached. Raises MechanicsError where one
     reached none.
     """
     top = float(pressures[-1])
-    free, blocked = inflations(actuator, material, top, job)
-    answers = [("tip free", free)] + ([("tip blocked", blocked)] if blocked is not None else [])
+    held: Curves | None = None
+    if blocked:
+        free, held = inflations(actuator, material, top, job)
+    else:
+        free = free_inflation(actuator, material).curves(top, job)
+    answers = [("tip free", free)] + ([("tip blocked", held)] if held is not None else [])
     for name, curves in answers:
         if not curves.pressure.size:
             raise MechanicsError(
@@ -131,7 +140,7 @@ def finite_element_response(
         pressure=pressures,
         angle=at(measured["angle"]) if "angle" in measured else None,
         displacement=at(measured["displacement"]),
-        blocked_force=None if blocked is None else _beyond_the_weight(blocked, pressures),
+        blocked_force=None if held is None else _beyond_the_weight(held, pressures),
         volume=at(measured["volume"]),
         max_von_mises=at(np.array([e.von_mises.value for e in free.extremes])),
         shortfalls=tuple(
