@@ -14,6 +14,7 @@ from typing import Any
 from rig import __version__
 from rig.spec.workspace import is_path
 from rig.study.errors import StudyError
+from rig.study.extras import package
 from rig.study.plan import Plan, Point, Space, Task
 from rig.study.quantities import UNITS
 
@@ -54,12 +55,11 @@ class Folder:
         self, plan: Plan, answers: Sequence[tuple[Point, Answer]], how: Mapping[str, Any]
     ) -> None:
         """Write the table and its manifest; raises StudyError."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        table = pa.table(columns(plan, answers))
-        buffer = pa.BufferOutputStream()
-        pq.write_table(table, buffer)
+        arrow = package("pyarrow", "study")
+        parquet = package("pyarrow.parquet", "study")
+        table = arrow.table(columns(plan, answers))
+        buffer = arrow.BufferOutputStream()
+        parquet.write_table(table, buffer)
         data = buffer.getvalue().to_pybytes()
         write_whole(self.path / RESULTS, data)
         manifest = _manifest(plan, answers, how, hashlib.sha256(data).hexdigest())

@@ -10,8 +10,12 @@ from typing import Any
 from rig.study.errors import StudyError
 from rig.study.evaluate import evaluate
 from rig.study.executor import Executor
+from rig.study.extras import package
 from rig.study.plan import Plan, Point, Task
 from rig.study.results import Answer, Folder
+
+AFTERWARDS = ("pyarrow", "statsmodels")
+"""Packages that table and surfaces take."""
 
 
 @dataclass(frozen=True)
@@ -69,8 +73,11 @@ def run_study(
 
     Every answer is kept as soon as it is there, failures too, except those of workers that died.
     `watch` is told of each, and answers False to stop: the result is None then, and the next call
-    goes on. Raises StudyError where results cannot be written.
+    goes on. Raises StudyError where results cannot be written,
+    and before anything is computed where the extra `study` is not installed.
     """
+    for needed in AFTERWARDS:  # to be missed now, not after a night of computing
+        package(needed, "study")
     known: dict[str, Answer] = {}
     wanted: dict[str, Task] = {}
     for point in plan.points:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.study.errors import StudyError
+from rig.study.extras import package
 from rig.study.factors import Array, Factor
 
 Model = Callable[[Array], Array]
@@ -67,9 +68,8 @@ def sobol_indices(model: Model, factors: Sequence[Factor], samples: int, seed: i
     `samples` is N, a power of two; the model is asked N (k + 2) times. Raises StudyError for other
     N, and where the model has no value at some point.
     """
-    from SALib.analyze import sobol as analysis
-    from SALib.sample import sobol as sampling
-
+    analysis = package("SALib.analyze.sobol", "study")
+    sampling = package("SALib.sample.sobol", "study")
     if samples < 2 or samples & (samples - 1):
         raise StudyError(
             f"{samples} samples do not keep the balance of a Sobol sequence; expected a power of "
@@ -96,9 +96,8 @@ def morris_screening(
 
     Raises StudyError where the model has no value at some point.
     """
-    from SALib.analyze import morris as analysis
-    from SALib.sample import morris as sampling
-
+    analysis = package("SALib.analyze.morris", "study")
+    sampling = package("SALib.sample.morris", "study")
     problem = _problem(factors)
     points = sampling.sample(problem, trajectories, num_levels=4, seed=seed)
     values = _sound(model(points))

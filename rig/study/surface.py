@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.study.errors import StudyError
+from rig.study.extras import package
 from rig.study.factors import (
     Array,
     Factor,
@@ -165,9 +166,8 @@ def fit_surface(
     The model is the full quadratic unless `terms` says otherwise. Raises StudyError where runs are
     too few or alias terms, and where values are not finite or all the same.
     """
-    import statsmodels.api as sm
-    from statsmodels.stats.outliers_influence import OLSInfluence
-
+    sm = package("statsmodels.api", "study")
+    influence_of = package("statsmodels.stats.outliers_influence", "study").OLSInfluence
     _check(response, values)
     x = coded(factors, np.asarray(points, dtype=float))
     terms = tuple(terms or quadratic_terms(len(factors)))
@@ -175,7 +175,7 @@ def fit_surface(
     names = [term_name(term, factors) for term in terms]
     require_estimable(matrix, names)
     fitted = sm.OLS(values, matrix, hasconst=True).fit()
-    influence = OLSInfluence(fitted)
+    influence = influence_of(fitted)
     n, p = matrix.shape
     variance = float(fitted.mse_resid)
     predictions = np.asarray(fitted.fittedvalues)

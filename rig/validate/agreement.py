@@ -91,17 +91,17 @@ def regression(simulation: ArrayLike, experiment: ArrayLike) -> Regression:
     _finite(x, y)
     if np.ptp(x) == 0:
         raise ValidateError("the simulation does not vary: no line can be drawn through it.")
-    import statsmodels.api as sm
+    from scipy import stats
 
-    fit = sm.OLS(y, sm.add_constant(x)).fit()
-    low, high = fit.conf_int()[1]
+    fit = stats.linregress(x, y)
+    half = float(stats.t.ppf(0.975, x.size - 2) * fit.stderr)
     varies = np.ptp(y) > 0
     return Regression(
-        slope=float(fit.params[1]),
-        intercept=float(fit.params[0]),
-        correlation=float(np.corrcoef(x, y)[0, 1]) if varies else 0.0,
-        p_value=float(fit.pvalues[1]) if varies else 1.0,
-        slope_interval=(float(low), float(high)),
+        slope=float(fit.slope),
+        intercept=float(fit.intercept),
+        correlation=float(fit.rvalue) if varies else 0.0,
+        p_value=float(fit.pvalue) if varies else 1.0,
+        slope_interval=(float(fit.slope) - half, float(fit.slope) + half),
     )
 
 

@@ -155,6 +155,15 @@ def test_a_model_with_too_few_terms_leaves_a_residual_that_is_not_white(
     assert poor.fit_percent < fit.fit_percent - 1
 
 
+def test_whiteness_is_that_of_ljung_and_box() -> None:
+    diagnostic = pytest.importorskip("statsmodels.stats.diagnostic", reason="an independent check")
+    residual = np.random.default_rng(3).normal(size=200).cumsum() + 4.0
+    residual[1:] -= 0.95 * residual[:-1]
+    theirs = float(diagnostic.acorr_ljungbox(residual, lags=[7])["lb_pvalue"].iloc[0])
+    assert 1e-6 < theirs < 0.9
+    assert whiteness(residual, lags=7) == pytest.approx(theirs, rel=1e-9)
+
+
 def test_another_recording_of_the_same_plant_is_foretold(fit: Fit) -> None:
     other = recorded(TRUE, pseudo_random(STROKE, 5, 9), seed=7)
     unseen = other.pressure_kpa - predict(fit, other)
