@@ -42,13 +42,23 @@ def _typed(pinned: Draft, now: Draft) -> Iterator[Row]:
         yield Row("family", pinned.family, now.family)
     if pinned.material != now.material:
         yield Row("material", pinned.material, now.material)
-    labels = {LIMIT: "pressure limit"}
+    shown = {LIMIT: ("pressure limit", "kPa")}
     for family in (pinned.family, now.family):
-        labels |= {item.name: item.label for item in form_fields(family)}
-    for name, label in labels.items():
-        before, after = (draft.values.get(name, NONE).strip() for draft in (pinned, now))
+        shown |= {item.name: (item.label, item.unit) for item in form_fields(family)}
+    for name, (label, unit) in shown.items():
+        before, after = (_value(draft.values.get(name, NONE), unit) for draft in (pinned, now))
         if before != after:
             yield Row(label, before, after)
+
+
+def _value(text: str, unit: str) -> str:
+    """What was typed, a bare number with the unit that it is taken in."""
+    text = text.strip()
+    try:
+        float(text)
+    except ValueError:
+        return text
+    return f"{text} {unit}".strip()
 
 
 def _figures(pinned: Design, now: Design) -> Iterator[Row]:

@@ -42,6 +42,7 @@ def traces_options(traces: Sequence[Trace], x_name: str, y_name: str, end: float
     ]
     options = _chart(lines, x_name, y_name)
     options["xAxis"] |= {"min": 0, "max": end}
+    options["xAxis"]["axisLabel"]["showMaxLabel"] = False  # an odd number beside a round one
     return options
 
 

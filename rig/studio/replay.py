@@ -64,11 +64,11 @@ class Moment:
         """The figures in a line."""
         said = [f"{self.time_s:.1f} s"]
         if self.pressure_kpa is not None:
-            said.append(f"{self.pressure_kpa:.2f} kPa")
+            said.append(f"{self.pressure_kpa:z.2f} kPa")
         if self.force_g is not None:
-            said.append(f"{self.force_g:.2f} g")
+            said.append(f"{self.force_g:z.2f} g")
         if self.angle_deg is not None:
-            said.append(f"last angle {self.angle_deg:.1f} deg")
+            said.append(f"last angle {self.angle_deg:z.1f} deg")
         if self.frame_s is not None:
             said.append(f"picture of {self.frame_s:.1f} s")
         return ", ".join((*said, self.doing) if self.doing else said)

@@ -51,6 +51,16 @@ def test_the_same_design_differs_in_nothing() -> None:
     assert all(row.pinned == row.now for row in compared(one, one))
 
 
+def test_a_bare_number_is_shown_in_the_unit_that_it_is_taken_in() -> None:
+    one, _ = design(DEFAULT)
+    bare, _ = design(DEFAULT.with_value("geometry.wall_thickness", "1.4").with_value(LIMIT, "8"))
+    rows = {row.what: row.now for row in compared(one, bare)}
+    assert rows["wall thickness"] == "1.4 mm"
+    assert rows["pressure limit"] == "8 kPa"
+    same, _ = design(DEFAULT.with_value("geometry.wall_thickness", "1.5"))
+    assert "wall thickness" not in {row.what for row in compared(one, same)}
+
+
 def test_what_a_model_does_not_know_is_left_blank() -> None:
     one, _ = design(DEFAULT)
     silent = replace(one, curve=replace(one.curve, force_g=None), mass_g=None)

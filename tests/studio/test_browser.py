@@ -92,6 +92,16 @@ def test_the_slider_bends_the_actuator_and_moves_the_cursors(pages: Pages, studi
     page.close()
 
 
+@pytest.mark.parametrize("width", [390, 820, 1440])
+def test_no_page_is_wider_than_its_window(pages: Pages, studio: str, width: int) -> None:
+    page = pages(viewport={"width": width, "height": 900})
+    for path in ("/", "/?actuator=bellow-joint", "/bench", "/runs"):
+        _open(page, studio + path)
+        page.get_by_role("heading", level=2).or_(page.get_by_label("filter")).first.wait_for()
+        assert page.evaluate("document.scrollingElement.scrollWidth") == width, path
+    page.close()
+
+
 def test_finite_elements_go_from_start_to_result(pages: Pages, studio: str) -> None:
     """In the plane, which takes a second: the solid is below."""
     page = pages()
@@ -242,6 +252,10 @@ def test_design_export_run_and_a_pulled_network(pages: Pages, studio: str, lab: 
     _press(watching, "Vent and stop")
     _says(watching, "state", "idle")
     _says(watching, "flags", "valve open")
+    _press(watching, "Disconnect")
+    _says(watching, "state", "no bench")
+    _says(watching, "pressure", "-")
+    assert watching.locator("[data-live=flags]").inner_text() == ""
     watching.close()
 
 

@@ -106,6 +106,7 @@ class DesignPage:
                 "unelevated"
             )
             self._replace = ui.checkbox("replace")
+        with ui.row().classes("actions"):
             for kind in FORMATS:
                 ui.button(
                     kind.upper(), on_click=telling(partial(self._export, kind)), color=None
@@ -268,6 +269,7 @@ class DesignPage:
     def _bend(self) -> float | None:
         """Draw the actuator at the slider's pressure; tells it in kPa, None without a model."""
         beam = self._beam
+        self._slider.set_visibility(beam is not None)
         if beam is None:
             self._bent.content = ""
             self._figures.text = "Beam theory is for the bending bellow; compute finite elements."
@@ -294,6 +296,7 @@ class DesignPage:
             chart.options.clear()
             chart.options.update(options)
             chart.update()
+            chart.set_visibility(bool(options["series"]))
         self._stale.set_visibility(self._fields is not None and fields is None)
 
     @property

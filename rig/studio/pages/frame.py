@@ -82,6 +82,11 @@ def number_of(value: object, otherwise: float) -> float:
     return otherwise
 
 
+def show_at_once(element: ui.element) -> None:
+    """Scroll to what was asked for: on a small screen it is below what is seen."""
+    element.client.run_javascript(f"getHtmlElement({element.id}).scrollIntoView()")
+
+
 def heading(text: str) -> None:
     """Of a panel."""
     ui.html(f"<h2>{text}</h2>", sanitize=False)

@@ -14,7 +14,7 @@ from nicegui import ui
 from rig.record.documents import ExperimentName
 from rig.report.summary import RunSummary
 from rig.studio.charts import Options, Trace, moved, traces_options
-from rig.studio.pages.frame import heading, number_of
+from rig.studio.pages.frame import heading, number_of, show_at_once
 from rig.studio.replay import Replay
 from rig.studio.runs import levels_of, short_names
 
@@ -65,6 +65,7 @@ class ReplayPanel:
                 self._over_time()
                 self._over_pressure()
         self._show()
+        show_at_once(self._panel)
 
     # --- what is there ---------------------------------------------------------------------
 

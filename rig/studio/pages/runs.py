@@ -12,7 +12,7 @@ from nicegui import ui
 from rig.errors import RigError
 from rig.studio.errors import StudioError
 from rig.studio.files import inside
-from rig.studio.pages.frame import frame, say, telling, text_of
+from rig.studio.pages.frame import frame, say, show_at_once, telling, text_of
 from rig.studio.pages.replay import Played, ReplayPanel
 from rig.studio.pages.work import Progress
 from rig.studio.replay import MOST_REPLAYS
@@ -157,6 +157,7 @@ class RunsPage:
     def _show_page(self, address: str) -> None:
         self._view.props(f'src="{address}"')
         self._view.set_visibility(True)
+        show_at_once(self._view)
 
 
 def _address(folder: str, name: str) -> str:

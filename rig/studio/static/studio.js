@@ -53,9 +53,9 @@ function showBench(news) {
   allow(news.may);
   tell("control", news.control);
   tell("state", news.connected ? news.state : "no bench");
-  tell("flags", news.flags);
-  tell("force", news.force === null ? "-" : news.force.toFixed(2));
-  tell("angle", news.angle === null ? "-" : news.angle.toFixed(1));
+  tell("flags", news.connected ? news.flags : "");
+  tell("force", fixed(news.force, 2));
+  tell("angle", news.connected ? fixed(news.angle, 1) : "-");
   tellIfAny("fault", fault);
   tellIfAny("said", news.said);
   tellIfAny("question", news.question ? `${news.question}, then press "Done as asked".` : "");
@@ -63,18 +63,28 @@ function showBench(news) {
   const progress = shown("progress");
   progress.max = news.total || 1;
   progress.value = news.done;
+  if (!news.connected) {  // what was said last is no longer so
+    for (const name of ["time", "pressure", "setpoint", "plunger"]) tell(name, "-");
+    tell("notes", "");
+  }
   if (!news.samples.length) return;
   const first = news.samples[0];
   if (trace.length && first[0] < trace[trace.length - 1][0]) trace = [];
   trace.push(...news.samples);
   const last = trace[trace.length - 1];
   while (trace[0][0] < last[0] - SHOWN_S) trace.shift();
-  tell("time", last[0].toFixed(1));
-  tell("pressure", last[1].toFixed(2));
-  tell("setpoint", last[2].toFixed(2));
-  tell("plunger", last[3].toFixed(2));
-  tell("notes", notes(news, last[0]));
   drawTrace();
+  if (!news.connected) return;
+  tell("time", fixed(last[0], 1));
+  tell("pressure", fixed(last[1], 2));
+  tell("setpoint", fixed(last[2], 2));
+  tell("plunger", fixed(last[3], 2));
+  tell("notes", notes(news, last[0]));
+}
+
+/* A number without a minus before zeros; a dash for none. */
+function fixed(value, digits) {
+  return value === null ? "-" : value.toFixed(digits).replace(/^-(?=[0.]*$)/, "");
 }
 
 function notes(news, now) {
