@@ -13,13 +13,10 @@ pytest.importorskip("ipykernel", reason="notebooks need nbclient and ipykernel")
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
-SLOW = {"virtual-run"}
 NAMES = sorted(path.stem for path in EXAMPLES.glob("*.ipynb"))
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.slow if n in SLOW else ()) for n in NAMES]
-)
+@pytest.mark.parametrize("name", NAMES)
 def test_the_notebook_runs(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]))
     notebook = nbformat.read(EXAMPLES / f"{name}.ipynb", as_version=4)

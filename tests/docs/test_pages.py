@@ -10,7 +10,9 @@ import pytest
 
 from rig.link.faults import HINTS
 from rig.spec.schema import schemas
+from tests.evidence import Evidence
 from tools.sitegen.commands import commands_page
+from tools.sitegen.evidence import FOLDER, evidence_pages, read_evidence
 from tools.sitegen.pins import HEADER, PinError, read_pins, wiring_diagram, wiring_table
 from tools.sitegen.plots import curves, read_table
 from tools.sitegen.specs import spec_pages
@@ -123,6 +125,43 @@ def test_plots_hold_the_numbers_of_the_pages_table() -> None:
     assert curves(table, "a (b)", "c").startswith("<svg")
     with pytest.raises(ValueError, match="no table"):
         read_table(page, "U")
+
+
+def test_the_results_page_shows_every_table_of_a_test_that_is_there() -> None:
+    pages = evidence_pages(ROOT)
+    page = str(pages["validation/results.md"])
+    files = sorted((ROOT / FOLDER).glob("*.csv"))
+    assert files
+    for path in files:
+        head, columns = read_evidence(path.read_text("utf-8"))
+        assert f"## {head['title']}" in page
+        assert f"| {' | '.join(columns)} |" in page
+        module, test = head["by"].split("::")
+        assert f"def {test}(" in (ROOT / module).read_text("utf-8")
+        picture = f"images/evidence/{path.stem}.svg"
+        assert (f"](../{picture})" in page) == (picture in pages) == (head["plot"] != "none")
+
+
+def test_what_a_test_finds_otherwise_than_the_site_shows_fails(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tests.evidence.ROOT", tmp_path)
+    (tmp_path / FOLDER).mkdir(parents=True)
+    table = {"case": ["a", "b"], "found (m)": [1.0, 2.0]}
+    with pytest.raises(AssertionError, match="not there yet"):
+        Evidence("here", renewing=False)("some", "Some", table)
+    Evidence("here", renewing=True)("some", "Some", table)
+    check = Evidence("here", renewing=False)
+    check("some", "Some", table)
+    check("some", "Some", {**table, "found (m)": [1.0, 2.01]}, rel=0.01)
+    for title, changed in (
+        ("Some", {**table, "found (m)": [1.0, 2.1]}),
+        ("Some", {**table, "case": ["a", "c"]}),
+        ("Some", {"case": ["a", "b"]}),
+        ("Other", table),
+    ):
+        with pytest.raises(AssertionError, match="pytest --evidence here"):
+            check("some", title, changed, rel=0.01)
 
 
 def test_no_formula_of_a_theory_page_is_a_block_of_code() -> None:

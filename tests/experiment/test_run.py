@@ -30,6 +30,7 @@ from rig.record.documents import PointDocument
 from rig.record.errors import RecordError
 from rig.record.reader import RunReader
 from rig.record.writer import RunWriter
+from tests.evidence import Evidence
 
 from .conftest import ROOT, SHORT, VirtualRun, make_request, take, take_rest
 from .truth import errors
@@ -214,6 +215,29 @@ def test_what_is_measured_is_what_is_so(short_run: VirtualRun) -> None:
     assert angle.rms < ANGLE_TARGET_DEG
     assert force.rms < FORCE_TARGET_G
     assert max(abs(angle.pressure_kpa).max(), abs(force.pressure_kpa).max()) < PRESSURE_TARGET_KPA
+
+
+def test_the_site_shows_what_is_measured(short_run: VirtualRun, evidence: Evidence) -> None:
+    points, truth = short_run.reader.points(), short_run.truth()
+    for experiment, quantity, unit, abs_tolerance in (
+        ("deformation", "angle", "deg", 0.05),
+        ("blocked_force", "force", "g", 0.05),
+    ):
+        found = errors(points, truth, experiment)
+        taken = [p for p in points if p.key.experiment == experiment]
+        evidence(
+            f"chain-{quantity}",
+            f"Whole chain: the {quantity} of a virtual run against the specimen's truth, which the "
+            "run cannot see",
+            {
+                "pressure (kPa)": [p.key.target_kpa for p in taken],
+                f"{quantity} error ({unit})": list(found.value),
+                f"stated 2 u ({unit})": list(2 * found.u),
+            },
+            plot="marks",
+            quantity=unit,
+            abs=abs_tolerance,
+        )
 
 
 @pytest.mark.parametrize("seed", [2, 3, 4])

@@ -192,6 +192,27 @@ def test_thick_walls_inflate_as_the_closed_form_says_at_third_order(
     assert np.log2(errors[1] / errors[2]) > 2.6
 
 
+def test_the_site_shows_how_thick_walls_converge(evidence) -> None:
+    counts = (2, 4, 8)
+    columns: dict[str, list[float]] = {"elements across the wall": list(counts)}
+    for body, solve, exact, exponent in (
+        ("cylinder", _pressure_of_cylinder, CYLINDER, 2),
+        ("sphere", _pressure_of_sphere, SPHERE, 3),
+    ):
+        reference = _closed_form(exact["bore"], exponent)
+        for family in ("quads", "triangles"):
+            errors = [abs(solve(n, family) / reference - 1) for n in counts]
+            columns[f"{body}, {family}"] = errors
+    evidence(
+        "thick-walls",
+        "Finite elements: pressure of thick cylinders and spheres of rubber against closed forms",
+        columns,
+        plot="loglog",
+        quantity="relative error",
+        rel=0.05,
+    )
+
+
 def test_pressure_control_finds_the_bore_that_displacement_control_was_given() -> None:
     mesh = ring(4, 8, INNER, OUTER)
     d = discretise(mesh, Kinematics.PLANE_STRAIN)
@@ -308,6 +329,22 @@ def _elastica() -> dict[float, tuple[float, float]]:
 def test_a_cantilever_follows_the_elastica_through_large_rotation() -> None:
     for load, expected in ELASTICA.items():
         assert _elastica()[load] == pytest.approx(expected, rel=1e-3)
+
+
+def test_the_site_shows_the_elastica(evidence) -> None:
+    ours = _elastica()
+    evidence(
+        "elastica",
+        "Finite elements: a cantilever through large rotation against the elastica",
+        {
+            "load P L2/(E I)": list(ELASTICA),
+            "deflection w/L, elastica": [w for w, _ in ELASTICA.values()],
+            "deflection w/L, ours": [ours[p][0] for p in ELASTICA],
+            "shortening u/L, elastica": [u for _, u in ELASTICA.values()],
+            "shortening u/L, ours": [ours[p][1] for p in ELASTICA],
+        },
+        rel=1e-4,
+    )
 
 
 def _figures() -> dict[str, tuple[float, float, float | None]]:

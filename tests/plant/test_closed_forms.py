@@ -21,6 +21,21 @@ def test_the_plant_agrees_with_theory(what: str) -> None:
     assert found.plant == pytest.approx(found.theory, rel=found.tolerance, abs=0.0)
 
 
+def test_the_site_shows_the_cases(evidence) -> None:
+    found = {what: compare() for what, compare in CASES.items()}
+    evidence(
+        "closed-forms-of-the-plant",
+        "Virtual bench: gas, flow and drive against closed forms",
+        {
+            "case": list(found),
+            "theory (SI)": [c.theory for c in found.values()],
+            "plant (SI)": [c.plant for c in found.values()],
+            "tolerated relative difference": [c.tolerance for c in found.values()],
+        },
+        rel=1e-4,
+    )
+
+
 def test_between_laminar_and_turbulent_more_pressure_brings_more_flow_without_jumps() -> None:
     resistance = 128 * AIR * TUBE_LENGTH / (np.pi * TUBE_DIAMETER**4)
     pressures = np.linspace(500, 8_000, 60)

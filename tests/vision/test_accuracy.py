@@ -45,6 +45,23 @@ def test_the_angle_is_right_within_a_tenth_of_a_degree_rms(results, record_prope
     assert np.abs(errors).max() < 0.3
 
 
+def test_the_site_shows_the_errors(results, evidence):
+    ordered = sorted(results, key=lambda pair: pair[0])
+    evidence(
+        "camera-angle",
+        "Vision: angles in rendered pictures of crooked cameras against the angles drawn",
+        {
+            "true angle (deg)": [angle for angle, _ in ordered],
+            "error (deg)": [r.angle_deg - angle for angle, r in ordered],
+            "stated U95 (deg)": [2 * r.u_deg for _, r in ordered],
+        },
+        plot="marks",
+        quantity="deg",
+        rel=1e-4,
+        abs=0.02,
+    )
+
+
 def test_nine_of_ten_errors_are_below_twice_the_stated_uncertainty(results):
     covered = [abs(r.angle_deg - angle) < 2.0 * r.u_deg for angle, r in results]
     assert np.mean(covered) >= 0.9

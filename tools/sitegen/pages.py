@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from .commands import commands_page
+from .evidence import evidence_pages
 from .pins import HEADER, read_pins, wiring_diagram, wiring_table
 from .plots import curves, read_table
 from .specs import spec_pages
@@ -26,6 +27,7 @@ def generated_pages(root: Path) -> dict[str, str | bytes]:
         ),
         "images/auysakul2023.svg": curves(experiment, "pressure (kPa)", "displacement (mm)"),
     }
+    pages |= evidence_pages(root)
     return pages | {f"reference/specs/{kind}.md": page for kind, page in spec_pages().items()}
 
 

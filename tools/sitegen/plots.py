@@ -35,6 +35,11 @@ def curves(table: Table, x_label: str, y_label: str) -> str:
     axes.set(xlabel=x_label, ylabel=y_label)
     axes.legend()
     axes.grid(alpha=0.3)
+    return svg(figure)
+
+
+def svg(figure: Figure) -> str:
+    """The figure's SVG element, the same for the same figure."""
     target = io.StringIO()
     figure.savefig(target, format="svg", metadata={"Date": None, "Creator": None})
     return re.sub(r"^.*?(?=<svg)", "", target.getvalue(), flags=re.DOTALL)
