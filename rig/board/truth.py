@@ -1,12 +1,12 @@
 """The virtual bench's truth, in a file of its own that no experiment opens.
 
-One channel `/truth`: time, pressure, angle, force as they really were, at every poll of the link.
+One channel `/truth`: time, pressure, deformation, force as they really were, at every poll of the
+link.
 """
 
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -15,35 +15,39 @@ from mcap.writer import CompressionType, Writer
 
 from rig.plant.plant import Truth
 from rig.record.channels import LOG_FILE
+from rig.spec.measurand import Measurand
 from rig.spec.quantity import STANDARD_GRAVITY
 
-SCHEMA = {
-    "type": "object",
-    "title": "truth",
-    "properties": {
-        "time_s": {"type": "number", "description": "bench time, s"},
-        "pressure_kpa": {"type": "number", "description": "gauge pressure in the syringe, kPa"},
-        "angle_deg": {"type": "number", "description": "bending angle, deg"},
-        "force_g": {"type": "number", "description": "tip force, gram-force"},
-        "volume_ml": {"type": "number", "description": "cavity volume, mL"},
-    },
-}
+
+def _schema(measurand: Measurand) -> bytes:
+    properties = {
+        "time_s": "bench time, s",
+        "pressure_kpa": "gauge pressure in the syringe, kPa",
+        "deformation": f"{measurand.quantity}, {measurand.unit}",
+        "force_g": "tip force, gram-force",
+        "volume_ml": "cavity volume, mL",
+    }
+    schema = {
+        "type": "object",
+        "title": "truth",
+        "properties": {n: {"type": "number", "description": d} for n, d in properties.items()},
+    }
+    return json.dumps(schema).encode()
 
 
 class TruthFile:
     """Writes truth samples to an MCAP file, from the moment the run's own log stands beside it."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, measurand: Measurand) -> None:
         self._path = path
+        self._measurand = measurand
         self._stream: BinaryIO | None = None
 
     def _begin(self) -> None:
         self._stream = self._path.open("wb")
         self._writer = Writer(self._stream, chunk_size=1 << 18, compression=CompressionType.ZSTD)
         self._writer.start(profile="", library="rig truth")
-        schema = self._writer.register_schema(
-            "rig.Truth", "jsonschema", json.dumps(SCHEMA).encode()
-        )
+        schema = self._writer.register_schema("rig.Truth", "jsonschema", _schema(self._measurand))
         self._channel = self._writer.register_channel("/truth", "json", schema)
 
     def write(self, time_s: float, truth: Truth) -> None:
@@ -55,7 +59,7 @@ class TruthFile:
         stamp = round(time_s * 1e9)
         row = (
             f'{{"time_s":{time_s:.3f},"pressure_kpa":{truth.gauge_pressure / 1e3:.6f},'
-            f'"angle_deg":{math.degrees(truth.angle):.6f},'
+            f'"deformation":{truth.deformation * self._measurand.per_si:.6f},'
             f'"force_g":{truth.force / STANDARD_GRAVITY * 1e3:.6f},'
             f'"volume_ml":{truth.actuator_volume * 1e6:.6f}}}'
         )
@@ -74,7 +78,8 @@ class TruthSample:
 
     time_s: float
     pressure_kpa: float
-    angle_deg: float
+    deformation: float
+    """In deg of an actuator that bends, in mm of one that lengthens."""
     force_g: float
     volume_ml: float
 

@@ -175,20 +175,20 @@ class PlantCamera:
     def grab(self) -> tuple[float, bytes]:
         """Bench time in seconds, as far as it is known, and the JPEG of a frame arriving now."""
         now_s = self._board.now_s
-        jpeg = self._camera.grab(self._angle(now_s - self.latency_s), now_s)
+        jpeg = self._camera.grab(self._deformation(now_s - self.latency_s), now_s)
         return now_s - self._known_s, jpeg
 
     def _witness(self) -> None:
-        """Note the angle now; forget what no frame can show any more."""
+        """Note the deformation now; forget what no frame can show any more."""
         now_s = self._board.now_s
-        self._seen.append((now_s, self._plant.truth().angle))
+        self._seen.append((now_s, self._plant.truth().deformation))
         while len(self._seen) > 1 and self._seen[1][0] <= now_s - self.latency_s:
             self._seen.popleft()
 
-    def _angle(self, time_s: float) -> float:
+    def _deformation(self, time_s: float) -> float:
         """Between two looks on the straight line; before the first, as at the first."""
-        times, angles = zip(*self._seen, strict=True)
-        return float(np.interp(time_s, times, angles))
+        times, seen = zip(*self._seen, strict=True)
+        return float(np.interp(time_s, times, seen))
 
 
 class VirtualBench:
@@ -214,7 +214,8 @@ class VirtualBench:
         seeds = Seeds.of(seed, segment)
         specimen = _specimen(setup, seeds, job)
         self.plant = _plant(setup, specimen, seeds)
-        self._truth = TruthFile(truth_path) if truth_path is not None else None
+        measurand = setup.actuator.measurand
+        self._truth = None if truth_path is None else TruthFile(truth_path, measurand)
         self._board = board_on(setup.bench, self.plant, start_s, self._write_truth)
         self.line: FaultyLine | None = None
         if faults is not None:

@@ -18,7 +18,7 @@ from rig.experiment.plan import make_plan
 from rig.experiment.run import new_run
 from rig.experiment.setup import RunRequest
 from rig.mechanics.job import Job
-from rig.mechanics.outline import bending_shape
+from rig.mechanics.outline import body_of
 from rig.record.documents import PointDocument, PointKey
 from rig.record.errors import RecordError
 from rig.record.reader import RunReader
@@ -94,7 +94,7 @@ def run_scenario(
         setup=setup,
         plan=make_plan(setup.protocol, setup.actuator, setup.bench),
         seed=seed,
-        cavity_volume=bending_shape(setup.actuator.geometry).cavity_volume,
+        cavity_volume=body_of(setup.actuator.geometry).cavity_volume,
     )
     bench = VirtualBench(setup, seed, folder / "truth.mcap", faults=script, job=job)
     line = bench.line

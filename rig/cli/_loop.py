@@ -18,7 +18,7 @@ from rig.experiment.identification import LoopRequest
 from rig.experiment.recorded import RunOutcome
 from rig.experiment.request import created_now, require_measured_calibrations
 from rig.experiment.setup import require_valid_calibrations
-from rig.mechanics.outline import bending_shape
+from rig.mechanics.outline import body_of
 from rig.record.writer import require_free_folder
 from rig.spec.faults import FaultScript
 from rig.spec.workspace import Setup
@@ -33,7 +33,7 @@ def loop_request(setup: Setup, seed: int) -> LoopRequest:
     return LoopRequest(
         setup=setup,
         seed=seed,
-        cavity_volume=bending_shape(setup.actuator.geometry).cavity_volume,
+        cavity_volume=body_of(setup.actuator.geometry).cavity_volume,
         created=created_now(setup),
     )
 

@@ -145,7 +145,14 @@ class Session:
             folder,
             bench,
             lambda observer, check: resume_run(
-                folder, bench, self.request, observer, done, check, done_parts
+                folder,
+                bench,
+                self.request,
+                observer,
+                done,
+                check,
+                done_parts,
+                reader.rest_image(),
             ),
         )
 

@@ -50,10 +50,9 @@ def latency(
     from rig.cli._calibration_file import finish, provenance, surroundings
     from rig.cli._interruption import catching_signals
     from rig.cli._session import new_session
-    from rig.experiment.calibration.latency import SwingPlan, swing_actuator
+    from rig.experiment.calibration.latency import SwingPlan, swing_actuator, swing_meter
     from rig.experiment.calibration.session import calibrate_on
     from rig.spec.workspace import Workspace
-    from rig.vision.measure import AngleMeter
 
     console = Console()
 
@@ -66,7 +65,7 @@ def latency(
     plan = SwingPlan.below(
         min(setup.actuator.limits.pressure, spec.safety.pressure) / 1e3, cycles, frames
     )
-    meter = AngleMeter(known.camera, known.ruler)
+    meter = swing_meter(setup)
     known_s = known.camera.latency_s(spec.camera.latency)
     swings: list[Swing] = []
     opened = session.open_without_log()

@@ -176,11 +176,11 @@ def _wanted(spec: ActuatorSpec, control: Control, text: str | None) -> Array | N
     targets = _grid(text, *_TARGET_UNITS[control], "--targets")
     if control is not Control.RADIUS:
         return targets
-    from rig.mechanics.outline import bending_shape
+    from rig.mechanics.outline import body_of
 
     if not (targets > 0).all():
         raise typer.BadParameter("--targets: an inner bend radius must be above zero.")
-    return bending_shape(spec.geometry).effective_length / targets
+    return body_of(spec.geometry).effective_length / targets
 
 
 def _controlled(response: Response, control: Control, values: Array) -> Response:

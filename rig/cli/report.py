@@ -21,7 +21,7 @@ def report(
     """Write summary, tables and report of a run again, from its log.
 
     Reads `run.mcap` alone and takes its points as they were recorded; `rig replay` measures the
-    pictures again, too. Writes `summary.json`, `points.csv`, `angles.csv`, `pressure.csv` and
+    pictures again, too. Writes `summary.json`, `points.csv`, `deformations.csv`, `pressure.csv` and
     `report.html`.
 
     Example: `rig report logs/bellow-bending-virtual-seed1`

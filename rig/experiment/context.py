@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 from rig.experiment.bench import Bench, Fixture, Observer
+from rig.experiment.deformation import DeformationMeter, needs_rest, recorded_meter
 from rig.experiment.prepare import tare
-from rig.experiment.recheck import recheck_camera
+from rig.experiment.errors import ExperimentError
+from rig.experiment.recheck import LOOKS, recheck_camera
 from rig.experiment.setup import RunRequest
 from rig.link.client import RigLink
 from rig.record.writer import RunWriter
@@ -21,12 +24,8 @@ class RunContext:
     link: RigLink
     request: RunRequest
     observer: Observer
-
-    @property
-    def meter(self) -> AngleMeter:
-        """Measures angles with the run's calibrations."""
-        calibrations = self.request.setup.calibrations
-        return AngleMeter(calibrations.camera, calibrations.ruler)
+    rest_jpeg: bytes | None = None
+    """The frame at rest of the run that is taken up."""
 
     def mount(self, fixture: Fixture) -> None:
         """Hold the tip as `fixture` says.
@@ -40,9 +39,28 @@ class RunContext:
             tare(self.link)
             self.bench.mount("blocked")
 
-    def check_camera(self, record: RunWriter) -> None:
-        """Whether the camera's calibration holds; raises ExperimentError if not."""
+    def ready_meter(self, record: RunWriter) -> DeformationMeter:
+        """The meter of the run, its camera checked and, if it needs that, the rest on record.
+
+        The bench must be vented. Raises ExperimentError if the camera's calibration does not hold
+        or the frame at rest cannot be trusted.
+        """
+        setup = self.request.setup
         self.observer.stage("checking the calibration of the camera")
-        residual = recheck_camera(self.bench.camera, self.meter)
+        meter = AngleMeter(setup.calibrations.camera, setup.calibrations.ruler)
+        residual = recheck_camera(self.bench.camera, meter)
         found = {"ruler_residual_px": f"{residual:.4f}"}
         record.event(self.link.now_s, "camera checked", found)
+        if self.rest_jpeg is not None or not needs_rest(setup):
+            return recorded_meter(setup, self.rest_jpeg)
+        for _ in range(LOOKS - 1):
+            with suppress(ExperimentError):
+                return self._rested_meter(record)
+        return self._rested_meter(record)
+
+    def _rested_meter(self, record: RunWriter) -> DeformationMeter:
+        """Of a frame taken now, which goes on record if it can be trusted."""
+        time_s, jpeg = self.bench.camera.grab()
+        meter = recorded_meter(self.request.setup, jpeg)
+        record.rest(time_s, jpeg)
+        return meter

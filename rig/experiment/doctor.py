@@ -15,13 +15,13 @@ import numpy as np
 
 from rig.errors import RigError
 from rig.experiment.bench import Bench
+from rig.experiment.deformation import live_meter
 from rig.experiment.setup import RunRequest, expired_calibrations
 from rig.experiment.sweep import cell_readings, pressures_kpa
 from rig.link.client import RigLink
 from rig.link.errors import LinkLostError
 from rig.link.schema import load_schema
 from rig.spec.workspace import BenchCalibrations
-from rig.vision.measure import AngleMeter
 from rig.vision.segment import decoded
 
 Status = Literal["ok", "warning", "failed"]
@@ -231,7 +231,6 @@ def _pressure(mean_kpa: float, noise_kpa: float, vented: bool) -> Finding:
 
 
 def _camera(bench: Bench, request: RunRequest) -> Finding:
-    calibrations = request.setup.calibrations
     _, jpeg = bench.camera.grab()
     image = decoded(jpeg)
     if image is None:
@@ -245,9 +244,11 @@ def _camera(bench: Bench, request: RunRequest) -> Finding:
     if not DARK < level < BRIGHT:
         advice = "the picture is too dark or too bright: check light and exposure"
         return Finding("camera", "failed", seen, advice)
-    found = AngleMeter(calibrations.camera, calibrations.ruler).measure(image)
-    if not found.accepted or found.angle_deg is None:
-        advice = f"ruler or actuator cannot be measured: {found.reason}"
+    meter = live_meter(request.setup)
+    sight = meter.see(image)
+    if sight.value is None:
+        advice = f"ruler or actuator cannot be measured: {sight.reason}"
         return Finding("camera", "failed", seen, advice)
-    seen |= {"angle_deg": round(found.angle_deg, 2), "u_deg": round(found.u_deg, 3)}
+    quantity, unit = meter.measurand.quantity.replace(" ", "_"), meter.measurand.unit
+    seen |= {f"{quantity}_{unit}": round(sight.value, 2), f"u_{unit}": round(sight.u, 3)}
     return Finding("camera", "ok", seen)

@@ -15,9 +15,16 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.record.documents import AngleReading, PointDocument, PointKey
-from rig.spec.calibration import CameraCalibration, LoadCellCalibration, TransducerCalibration
-from rig.validate.budget import force_components, pressure_components, readings, tare_component
+from rig.record.documents import DeformationReading, PointDocument, PointKey, UncertaintyPart
+from rig.spec.calibration import LoadCellCalibration, TransducerCalibration
+from rig.spec.measurand import DeformationUnit
+from rig.validate.budget import (
+    averaged,
+    force_components,
+    pressure_components,
+    readings,
+    tare_component,
+)
 from rig.validate.uncertainty import Component, combine
 
 HAMPEL_LIMIT = 6.0
@@ -64,27 +71,25 @@ class CellReading:
     status: str
 
 
-def angle_point(
-    visit: Visit, frames: Sequence[AngleReading], camera: CameraCalibration
+def deformation_point(
+    visit: Visit, frames: Sequence[DeformationReading], unit: DeformationUnit
 ) -> PointDocument:
-    """The bending angle of a point in degrees from the vision results of its frames.
+    """The bending angle or elongation of a point from the vision results of its frames.
 
-    What vision is unsure of in a frame is common to all frames of a still scene (ruler, shading,
-    edges), so it is not reduced by averaging; the lens is told apart from it.
+    What vision is unsure of in a frame is common to all frames of a still scene (ruler, lens,
+    shading, edges), so it is not reduced by averaging.
     """
-    accepted = [r for r in frames if r.accepted and r.angle_deg is not None]
+    accepted = [r for r in frames if r.accepted and r.value is not None]
     rejected = tuple(r.reason for r in frames if not r.accepted)
-    angles = np.array([r.angle_deg for r in accepted], dtype=np.float64)
-    if len(angles) == 0:
-        return _document(visit, "deg", None, angles, (), rejected)
-    vision = float(np.mean([r.u_deg for r in accepted]))
-    lens = min(camera.angle_u_deg, vision)
+    values = np.array([r.value for r in accepted], dtype=np.float64)
+    if len(values) == 0:
+        return _document(visit, unit, None, values, (), rejected)
+    budgets = zip(*([component_of(part) for part in r.parts] for r in accepted), strict=True)
     parts = (
-        readings(_spread(angles), len(angles), "deg"),
-        Component("edges and ruler", math.sqrt(vision**2 - lens**2), unit="deg"),
-        Component("lens", lens, unit="deg"),
+        readings(_spread(values), len(values), unit),
+        *(averaged(alike) for alike in budgets),
     )
-    return _document(visit, "deg", float(angles.mean()), angles, parts, rejected)
+    return _document(visit, unit, float(values.mean()), values, parts, rejected)
 
 
 def force_point(
@@ -132,11 +137,11 @@ def _document(
             "pressure_kpa": visit.pressure_kpa,
             "pressure_sd_kpa": _spread(visit.indicated_kpa),
             "pressure_u_kpa": combine(0.0, visit.pressure_components).u,
-            "pressure_parts": _lines(visit.pressure_components),
+            "pressure_parts": budget_lines(visit.pressure_components),
             "value": value,
             "value_sd": _spread(used),
             "value_u": combine(0.0, parts).u,
-            "value_parts": _lines(parts),
+            "value_parts": budget_lines(parts),
             "unit": unit,
             "readings": len(used),
             "rejected": rejected,
@@ -144,6 +149,15 @@ def _document(
     )
 
 
-def _lines(parts: Sequence[Component]) -> list[dict[str, object]]:
+def budget_lines(parts: Sequence[Component]) -> tuple[UncertaintyPart, ...]:
     """Components as the documents keep them: JSON knows no infinity."""
-    return [asdict(p) | {"dof": p.dof if math.isfinite(p.dof) else None} for p in parts]
+    return tuple(
+        UncertaintyPart.model_validate(asdict(p) | {"dof": p.dof if math.isfinite(p.dof) else None})
+        for p in parts
+    )
+
+
+def component_of(part: UncertaintyPart) -> Component:
+    """A line of a budget as it was recorded."""
+    values = part.model_dump()
+    return Component(**values | {"dof": math.inf if part.dof is None else part.dof})

@@ -1,4 +1,4 @@
-"""The two measurements: bending angle by camera, blocked force by load cell."""
+"""The two measurements: deformation by camera, blocked force by load cell."""
 
 from __future__ import annotations
 
@@ -6,44 +6,43 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from rig.experiment.bench import Camera
+from rig.experiment.deformation import UNREADABLE, DeformationMeter, Sight, rejected
 from rig.experiment.errors import ExperimentError
-from rig.experiment.evaluate import angle_point, force_point
+from rig.experiment.evaluate import budget_lines, deformation_point, force_point
 from rig.experiment.plan import MEASURE_S
 from rig.experiment.sweep import Arrival, cell_readings
 from rig.link.client import Message, RigLink
 from rig.link.schema import Schema
-from rig.record.documents import AngleReading, PointDocument, PointKey
+from rig.record.documents import DeformationReading, PointDocument, PointKey
 from rig.record.writer import RunWriter
-from rig.spec.calibration import CameraCalibration, LoadCellCalibration
-from rig.vision.measure import AngleMeter
+from rig.spec.calibration import LoadCellCalibration
 from rig.vision.segment import decoded
 
 RETRY_FACTOR = 2
 """At most this many times the wanted readings are taken to make up for rejected ones."""
 
 
-def read_angle(meter: AngleMeter, jpeg: bytes, key: PointKey, frame: int) -> AngleReading:
-    """Vision result of one recorded frame; the same for a live run and a replay."""
+def sighted(meter: DeformationMeter, jpeg: bytes) -> Sight:
+    """What a picture as it was recorded tells."""
     image = decoded(jpeg)
-    if image is None:
-        return AngleReading(
-            key=key,
-            frame=frame,
-            angle_deg=None,
-            u_deg=0.0,
-            quality=0.0,
-            accepted=False,
-            reason="the frame is no readable picture",
-        )
-    result = meter.measure(image)
-    return AngleReading(
+    return rejected(UNREADABLE) if image is None else meter.see(image)
+
+
+def read_deformation(
+    meter: DeformationMeter, jpeg: bytes, key: PointKey, frame: int
+) -> DeformationReading:
+    """Vision result of one recorded frame; the same for a live run and a replay."""
+    sight = sighted(meter, jpeg)
+    return DeformationReading(
         key=key,
         frame=frame,
-        angle_deg=result.angle_deg,
-        u_deg=result.u_deg,
-        quality=result.quality,
-        accepted=result.accepted,
-        reason=result.reason,
+        value=sight.value,
+        unit=meter.measurand.unit,
+        u=sight.u,
+        parts=budget_lines(sight.parts),
+        quality=sight.quality,
+        accepted=sight.accepted,
+        reason=sight.reason,
     )
 
 
@@ -56,12 +55,11 @@ class Measurement(Protocol):
 
 
 @dataclass(frozen=True)
-class AngleMeasurement:
-    """Takes frames of a still actuator, spread over a second, and measures its angle."""
+class DeformationMeasurement:
+    """Takes frames of a still actuator, spread over a second, and measures its deformation."""
 
     camera: Camera
-    meter: AngleMeter
-    calibration: CameraCalibration
+    meter: DeformationMeter
     frames: int
     frame_period_s: float
 
@@ -70,16 +68,16 @@ class AngleMeasurement:
         from_s = link.now_s
         spacing_s = max(self.frame_period_s, MEASURE_S / self.frames)
         messages: list[Message] = []
-        readings: list[AngleReading] = []
+        readings: list[DeformationReading] = []
         while (
             sum(r.accepted for r in readings) < self.frames
             and len(readings) < RETRY_FACTOR * self.frames
         ):
             messages += link.wait(spacing_s)
             time_s, jpeg = self.camera.grab()
-            reading = read_angle(self.meter, jpeg, arrival.key, len(readings))
+            reading = read_deformation(self.meter, jpeg, arrival.key, len(readings))
             record.image(time_s, jpeg, arrival.key, reading.frame)
-            record.angle(reading, time_s)
+            record.deformation(reading, time_s)
             readings.append(reading)
         if not any(r.accepted for r in readings):
             raise ExperimentError(
@@ -87,7 +85,8 @@ class AngleMeasurement:
                 f"trusted; the last one: {readings[-1].reason}. They are in the log. Check light, "
                 "focus and view (`rig measure` on a frame tells more), then `rig resume` the run."
             )
-        return angle_point(arrival.visit(from_s, messages), readings, self.calibration)
+        visit = arrival.visit(from_s, messages)
+        return deformation_point(visit, readings, self.meter.measurand.unit)
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,8 @@ COVERAGE = 3.0
 WHERE_TO_LOOK = {
     "deg": "Look for a blocked or kinked tube, and whether the camera shows this actuator. The "
     "actuator may still hold pressure",
+    "mm": "Look for a blocked or kinked tube, and whether the camera shows this actuator's "
+    "markers. The actuator may still hold pressure",
     "g": "Look for a blocked or kinked tube, whether the tip touches the load cell, and whether "
     "counts_per_gram has the right sign. The actuator may still hold pressure",
 }

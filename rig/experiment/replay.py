@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.experiment.evaluate import CellReading, Visit, angle_point, force_point
-from rig.experiment.measure import read_angle
+from rig.experiment.deformation import recorded_meter
+from rig.experiment.evaluate import CellReading, Visit, deformation_point, force_point
+from rig.experiment.measure import read_deformation
 from rig.link.schema import load_schema
-from rig.record.documents import AngleReading, PointDocument, PointKey
+from rig.record.documents import DeformationReading, PointDocument, PointKey
 from rig.record.reader import RunReader
-from rig.vision.measure import AngleMeter
 
 
 @dataclass(frozen=True)
@@ -39,11 +39,11 @@ class Difference:
 
 
 class ReplayedRun(RunReader):
-    """A recorded run whose angles and points are computed again from images and telemetry."""
+    """A recorded run whose deformations and points are computed again from images and telemetry."""
 
     def __init__(self, run: Path) -> None:
         super().__init__(run)
-        self._calibrations = self.setup().calibrations
+        self._setup = self.setup()
 
     def recorded_points(self) -> tuple[PointDocument, ...]:
         """The points as they were taken."""
@@ -53,7 +53,7 @@ class ReplayedRun(RunReader):
         """The points computed again."""
         return self._points
 
-    def angle_readings(self) -> tuple[AngleReading, ...]:
+    def deformation_readings(self) -> tuple[DeformationReading, ...]:
         """The vision results computed again."""
         return self._readings
 
@@ -63,11 +63,14 @@ class ReplayedRun(RunReader):
         return [Difference(old.key, old.value, new.value) for old, new in pairs]
 
     @cached_property
-    def _readings(self) -> tuple[AngleReading, ...]:
-        meter = AngleMeter(self._calibrations.camera, self._calibrations.ruler)
+    def _readings(self) -> tuple[DeformationReading, ...]:
+        images = [image for image in self.images() if image.key is not None]
+        if not images:
+            return ()
+        meter = recorded_meter(self._setup, self.rest_image())
         return tuple(
-            read_angle(meter, image.jpeg, image.key, image.frame)
-            for image in self.images()
+            read_deformation(meter, image.jpeg, image.key, image.frame)
+            for image in images
             if image.key is not None
         )
 
@@ -76,9 +79,10 @@ class ReplayedRun(RunReader):
         return tuple(self._recompute())
 
     def _recompute(self) -> Iterator[PointDocument]:
-        by_key: dict[PointKey, list[AngleReading]] = defaultdict(list)
+        by_key: dict[PointKey, list[DeformationReading]] = defaultdict(list)
         for reading in self._readings:
             by_key[reading.key].append(reading)
+        calibrations, unit = self._setup.calibrations, self._setup.actuator.measurand.unit
         pressure = self.telemetry("PRESSURE")
         cell = self.telemetry("LOAD_CELL")
         statuses = load_schema().choices("LOAD_CELL", "load_cell_status")
@@ -91,10 +95,10 @@ class ReplayedRun(RunReader):
                 measured_from_s=point.measured_from_s,
                 measured_to_s=point.measured_to_s,
                 indicated_kpa=pressure["pressure_kpa"][inside],
-                transducer=self._calibrations.transducer,
+                transducer=calibrations.transducer,
             )
             if point.key.experiment == "deformation":
-                yield angle_point(visit, by_key[point.key], self._calibrations.camera)
+                yield deformation_point(visit, by_key[point.key], unit)
             else:
                 chosen = _within(point, cell["time_s"])
                 readings = [
@@ -105,7 +109,7 @@ class ReplayedRun(RunReader):
                         strict=True,
                     )
                 ]
-                yield force_point(visit, readings, self._calibrations.load_cell)
+                yield force_point(visit, readings, calibrations.load_cell)
 
 
 def _within(point: PointDocument, time_s: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -8,7 +8,7 @@ from rig.experiment.errors import ExperimentError
 from rig.experiment.plan import make_plan
 from rig.experiment.program import plan_trials
 from rig.experiment.setup import RunRequest, expired_calibrations, require_valid_calibrations
-from rig.mechanics.outline import bending_shape
+from rig.mechanics.outline import body_of
 from rig.spec.workspace import Setup
 
 
@@ -21,7 +21,7 @@ def make_request(setup: Setup, seed: int, *, expired: bool = False) -> RunReques
     if not expired:
         require_valid_calibrations(setup.calibrations, today)
     caution = expired_calibrations(setup.calibrations, today)
-    cavity = bending_shape(setup.actuator.geometry).cavity_volume
+    cavity = body_of(setup.actuator.geometry).cavity_volume
     request = RunRequest(
         setup=setup,
         plan=make_plan(setup.protocol, setup.actuator, setup.bench),

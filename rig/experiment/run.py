@@ -8,8 +8,9 @@ from pathlib import Path
 from rig.control.gas_monitor import GasAlarm
 from rig.experiment.bench import Bench, Fixture, Observer
 from rig.experiment.context import RunContext
+from rig.experiment.deformation import DeformationMeter
 from rig.experiment.gas_watch import GasWatch, describe_alarm, gas_monitor
-from rig.experiment.measure import AngleMeasurement, ForceMeasurement, Measurement
+from rig.experiment.measure import DeformationMeasurement, ForceMeasurement, Measurement
 from rig.experiment.plan import Sweep
 from rig.experiment.plausible import ResponseCheck, require_zero
 from rig.experiment.prepare import (
@@ -88,8 +89,12 @@ def resume_run(
     done: Collection[PointKey],
     interrupted: Callable[[], None] | None = None,
     done_parts: Collection[PartKey] = (),
+    rest_jpeg: bytes | None = None,
 ) -> RunOutcome:
-    """Do what is left of the plan and append it to the log in `folder`; see `new_run`."""
+    """Do what is left of the plan and append it to the log in `folder`; see `new_run`.
+
+    `rest_jpeg` is the log's frame of the actuator at rest, if it has one.
+    """
     # the log is locked before the bench hears anything: another process may be using both
     with (
         explaining_disk_errors(folder),
@@ -105,7 +110,8 @@ def resume_run(
             versions=versions(identity),
         )
         record.resume_note(note, link.now_s)
-        return _recorded(RunContext(bench, link, request, observer), record, done, done_parts)
+        context = RunContext(bench, link, request, observer, rest_jpeg)
+        return _recorded(context, record, done, done_parts)
 
 
 def _configure(link: RigLink, request: RunRequest) -> dict[str, float]:
@@ -166,8 +172,9 @@ def _experiments(
     mounted: ExperimentName | None = None
     observer.stage("homing the plunger and zeroing the transducer")
     make_ready(link)
-    if any(s.experiment == "deformation" and not done.issuperset(s.keys) for s in sweeps):
-        context.check_camera(record)
+    meter: DeformationMeter | None = None
+    if _needs_camera(context, done, done_parts):
+        meter = context.ready_meter(record)
     for sweep in sweeps:
         left = [key for key in sweep.keys if key not in done]
         if not left:
@@ -179,8 +186,8 @@ def _experiments(
                 watch.renew()
             observer.stage("conditioning the actuator")
             condition(link, context.request.plan.settings(mounted))
-        _sweep(context, record, recorder, sweep, left)
-    run_trials(context, record, recorder, watch, done_parts)
+        _sweep(context, record, recorder, sweep, left, meter)
+    run_trials(context, record, recorder, watch, done_parts, meter)
 
 
 def _sweep(
@@ -189,11 +196,12 @@ def _sweep(
     recorder: LinkRecorder,
     sweep: Sweep,
     left: list[PointKey],
+    meter: DeformationMeter | None,
 ) -> None:
     """One repeat: from the vented state through its pressures, and vented again."""
     link, observer = context.link, context.observer
     section = context.request.plan.settings(sweep.experiment)
-    measure = _measurement(context, sweep.experiment)
+    measure = _measurement(context, sweep.experiment, meter)
     observer.stage(f"resting vented before repeat {sweep.repeat}")
     link.wait(section.rest)
     leave_home(link)
@@ -221,14 +229,32 @@ def _sweep(
     require_zero(vented_pressure_kpa(link), section.settling.tolerance / 1e3)
 
 
-def _measurement(context: RunContext, experiment: ExperimentName) -> Measurement:
+def _needs_camera(
+    context: RunContext, done: Collection[PointKey], done_parts: Collection[PartKey]
+) -> bool:
+    """Whether what is left asks for a deformation."""
+    request = context.request
+    return any(
+        key.experiment == "deformation" and key not in done
+        for sweep in request.plan.sweeps
+        for key in sweep.keys
+    ) or any(
+        program.looks and program.key not in done_parts
+        for plan in request.trials
+        for program in plan.programs
+    )
+
+
+def _measurement(
+    context: RunContext, experiment: ExperimentName, meter: DeformationMeter | None
+) -> Measurement:
     setup, section = context.request.setup, context.request.plan.settings(experiment)
     calibrations = setup.calibrations
     if isinstance(section, DeformationProtocol):
-        return AngleMeasurement(
+        assert meter is not None  # there is something for it
+        return DeformationMeasurement(
             camera=context.bench.camera,
-            meter=context.meter,
-            calibration=calibrations.camera,
+            meter=meter,
             frames=section.frames,
             frame_period_s=1 / setup.bench.camera.frame_rate,
         )

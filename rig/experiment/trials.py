@@ -9,7 +9,9 @@ import numpy as np
 
 from rig.experiment.bench import Fixture
 from rig.experiment.context import RunContext
+from rig.experiment.deformation import DeformationMeter
 from rig.experiment.gas_watch import GasWatch
+from rig.experiment.measure import sighted
 from rig.experiment.prepare import leave_home, vent
 from rig.experiment.program import Motor, Program, TrialPlan
 from rig.experiment.recorder import LinkRecorder
@@ -17,8 +19,6 @@ from rig.experiment.sweep import go_to
 from rig.link.client import POLL_S
 from rig.record.documents import LookDocument, PartDocument, PartKey
 from rig.record.writer import RunWriter
-from rig.vision.measure import AngleMeter
-from rig.vision.segment import decoded
 
 RATE = "setpoint_rate_kpa_s"
 LEAST_RATE_KPA_S = 0.01
@@ -37,18 +37,21 @@ def run_trials(
     recorder: LinkRecorder,
     watch: GasWatch | None,
     done: Collection[PartKey],
+    meter: DeformationMeter | None,
 ) -> None:
-    """Every trial that still has parts to do, each from the vented state."""
+    """Every trial that still has parts to do, each from the vented state.
+
+    `meter` is needed by those that look.
+    """
     plans = [p for p in context.request.trials if any(g.key not in done for g in p.programs)]
-    if any(program.looks for plan in plans for program in plan.programs):
-        context.check_camera(record)
     rate_kpa_s = context.request.board_parameters()[RATE]
     for plan in plans:
         fixture: Fixture = "blocked" if plan.trial.kind == "pull" else "free"
         context.mount(fixture)
         if watch is not None:
             watch.renew()
-        _trial(context, record, recorder, plan, [p for p in plan.programs if p.key not in done])
+        left = [p for p in plan.programs if p.key not in done]
+        _trial(context, record, recorder, plan, left, meter)
         context.link.write_parameter(RATE, rate_kpa_s)
 
 
@@ -58,6 +61,7 @@ def _trial(
     recorder: LinkRecorder,
     plan: TrialPlan,
     left: list[Program],
+    meter: DeformationMeter | None,
 ) -> None:
     """Parts of one repeat follow each other under pressure; repeats begin vented."""
     link, trial = context.link, plan.trial
@@ -72,7 +76,7 @@ def _trial(
             leave_home(link)
         context.observer.stage(describe_part(program.key))
         record.event(link.now_s, "part", program.key.model_dump())
-        document = Player(context, record, program).play()
+        document = Player(context, record, program, meter).play()
         recorder.flush()
         record.part(document, link.now_s)
         for note in document.notes:
@@ -90,12 +94,18 @@ def describe_part(key: PartKey) -> str:
 class Player:
     """Plays one program; the board is idle or, in a later part of a repeat, regulates."""
 
-    def __init__(self, context: RunContext, record: RunWriter, program: Program) -> None:
+    def __init__(
+        self,
+        context: RunContext,
+        record: RunWriter,
+        program: Program,
+        meter: DeformationMeter | None,
+    ) -> None:
         self._context = context
         self._link = context.link
         self._record = record
         self._program = program
-        self._meter: AngleMeter | None = context.meter if program.looks else None
+        self._meter = meter
         self._notes = list(program.notes)
         self._rejected: list[str] = []
         self._accepted = 0
@@ -188,20 +198,18 @@ class Player:
         time_s, jpeg = self._context.bench.camera.grab()
         frame = self._accepted + len(self._rejected)
         self._record.image(time_s, jpeg, None, frame)
-        image = decoded(jpeg)
-        result = None if image is None else self._meter.measure(image)
-        accepted = result is not None and result.accepted
-        reason = "the frame is no readable picture" if result is None else result.reason
-        if accepted:
+        sight = sighted(self._meter, jpeg)
+        if sight.accepted:
             self._accepted += 1
         else:
-            self._rejected.append(reason)
+            self._rejected.append(sight.reason)
         look = LookDocument(
             key=self._program.key,
             time_s=time_s - started_s,
-            angle_deg=None if result is None else result.angle_deg,
-            u_deg=0.0 if result is None else result.u_deg,
-            accepted=accepted,
-            reason=reason,
+            value=sight.value,
+            unit=self._meter.measurand.unit,
+            u=sight.u,
+            accepted=sight.accepted,
+            reason=sight.reason,
         )
         self._record.look(look, time_s)

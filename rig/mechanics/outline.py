@@ -1,6 +1,9 @@
-"""What a bench sees of an actuator that bends, whatever its family: outlines and volume at rest."""
+"""What a bench sees of an actuator, whatever its family: outlines, and volume and mass at rest."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,12 +11,23 @@ from numpy.typing import NDArray
 from rig.mechanics import profile
 from rig.mechanics.bellow import BellowShape
 from rig.mechanics.chambers import ChamberRow
-from rig.mechanics.errors import MechanicsError
+from rig.mechanics.mesh.bellow_axisymmetric import AxisymmetricBellow
+from rig.mechanics.mesh.bellow_joint import JointBellow
 from rig.mechanics.response import SideProfile
 from rig.mechanics.shells import SlitShell
-from rig.spec.actuator import BellowBendingGeometry, Geometry
-from rig.spec.chambers import BellowRectangularGeometry, MultiChamberBendingGeometry
-from rig.spec.shells import ShellReinforcedBendingGeometry
+from rig.spec.actuator import (
+    BellowAxisymmetricGeometry,
+    BellowBendingGeometry,
+    BellowGripperGeometry,
+    BellowJointGeometry,
+    Geometry,
+)
+from rig.spec.chambers import (
+    BellowRectangularGeometry,
+    MultiChamberBendingGeometry,
+    MultiChamberLinearGeometry,
+)
+from rig.spec.shells import ShellReinforcedBendingGeometry, ShellReinforcedLinearGeometry
 
 Array = NDArray[np.float64]
 
@@ -24,48 +38,119 @@ PLATE_THICKNESS = 3e-3
 actuator, not a plug."""
 _CONNECTOR_MARGIN = 2e-3
 """By which that plate stands out over the chambers, metres."""
+FLAG_SIDE = 10e-3
+"""Black square of the markers on an actuator that lengthens, metres."""
+FLAG_PAPER = 1.5 * FLAG_SIDE
+"""Side of the white paper that they are printed on, metres."""
+_FLAG_GAP = 1e-3
+"""Between the cap's plate and the paper below it, metres."""
 _PIECE = 2e-3
 """Longest straight piece of a bent outline, metres."""
 
 
-def side_profile(geometry: Geometry, angle: float) -> SideProfile:
-    """Outlines in the plane of bending for a bending angle in rad; see `SideProfile`.
-
-    Raises MechanicsError for a family that does not bend.
-    """
+def side_profile(geometry: Geometry, deformation: float) -> SideProfile:
+    """Outlines seen from the side, for a bending angle in rad or an elongation in m."""
     match geometry:
         case BellowBendingGeometry():
-            return profile.side_profile(geometry, angle)
+            return profile.side_profile(geometry, deformation)
         case BellowRectangularGeometry() | MultiChamberBendingGeometry():
             row = ChamberRow.of(geometry)
-            return _profile(row, angle, _floor_of(row), _roof_of(row))
+            return _bent_profile(row, deformation, _floor_of(row), _roof_of(row))
         case ShellReinforcedBendingGeometry():
             tube = SlitShell.of(geometry)
             along = np.array([tube.start, tube.start, tube.end, tube.end])
             roof = np.column_stack((along, tube.height * np.array([0, 1, 1, 0])))
-            return _profile(tube, angle, tube.radius - tube.chamber_radius, roof)
-        case _:
-            raise _does_not_bend(geometry)
+            return _bent_profile(tube, deformation, tube.radius - tube.chamber_radius, roof)
+        case ShellReinforcedLinearGeometry():
+            tube = SlitShell.of(geometry)
+            straight = np.array([[tube.start, tube.radius], [tube.end, tube.radius]])
+            return _lengthened_profile(tube.start, tube.end, straight, deformation)
+        case MultiChamberLinearGeometry():
+            row = ChamberRow.of(geometry)
+            steps = _roof_of(row)[1:-1] - [0.0, row.height / 2]
+            return _lengthened_profile(row.start, row.end, steps, deformation)
+        case BellowAxisymmetricGeometry() | BellowJointGeometry() | BellowGripperGeometry():
+            body = _body_of_revolution(geometry)
+            return _lengthened_profile(body.start, body.end, body.contour(), deformation)
 
 
-def bending_shape(geometry: Geometry) -> BellowShape | ChamberRow | SlitShell:
-    """Dimensions, volumes and masses; raises MechanicsError for a family that does not bend."""
+class Body(Protocol):
+    """What benches and controllers need to know of an actuator at rest."""
+
+    @property
+    def effective_length(self) -> float:
+        """Length that bends or lengthens in m."""
+        ...
+
+    @property
+    def cavity_volume(self) -> float:
+        """In m3."""
+        ...
+
+    def soft_mass(self, density: float) -> float:
+        """Of what deforms in kg, `density` in kg/m3."""
+        ...
+
+    def cap_mass(self, density: float) -> float:
+        """Of what is moved as a whole in kg, `density` in kg/m3."""
+        ...
+
+
+def body_of(geometry: Geometry) -> Body:
+    """Dimensions, volumes and masses."""
     match geometry:
         case BellowBendingGeometry():
             return BellowShape.of(geometry)
-        case BellowRectangularGeometry() | MultiChamberBendingGeometry():
+        case (
+            BellowRectangularGeometry()
+            | MultiChamberBendingGeometry()
+            | MultiChamberLinearGeometry()
+        ):
             return ChamberRow.of(geometry)
-        case ShellReinforcedBendingGeometry():
+        case ShellReinforcedBendingGeometry() | ShellReinforcedLinearGeometry():
             return SlitShell.of(geometry)
-        case _:
-            raise _does_not_bend(geometry)
+        case BellowGripperGeometry():
+            return Pair(AxisymmetricBellow.of(geometry.finger))
+        case BellowAxisymmetricGeometry() | BellowJointGeometry():
+            return _body_of_revolution(geometry)
 
 
-def _does_not_bend(geometry: Geometry) -> MechanicsError:
-    return MechanicsError(
-        f"actuators of the family '{geometry.family}' do not bend, and the bench measures bending "
-        "only: it can be predicted and exported, not characterised."
-    )
+@dataclass(frozen=True)
+class Pair:
+    """Two equal bodies side by side, inflated together."""
+
+    one: Body
+
+    @property
+    def effective_length(self) -> float:
+        """Of either in m."""
+        return self.one.effective_length
+
+    @property
+    def cavity_volume(self) -> float:
+        """Of both in m3."""
+        return 2 * self.one.cavity_volume
+
+    def soft_mass(self, density: float) -> float:
+        """Of both in kg."""
+        return 2 * self.one.soft_mass(density)
+
+    def cap_mass(self, density: float) -> float:
+        """Of both in kg."""
+        return 2 * self.one.cap_mass(density)
+
+
+def _body_of_revolution(
+    geometry: BellowAxisymmetricGeometry | BellowJointGeometry | BellowGripperGeometry,
+) -> AxisymmetricBellow | JointBellow:
+    """The one that the camera sees."""
+    match geometry:
+        case BellowGripperGeometry():
+            return AxisymmetricBellow.of(geometry.finger)
+        case BellowAxisymmetricGeometry():
+            return AxisymmetricBellow.of(geometry)
+        case BellowJointGeometry():
+            return JointBellow.of(geometry)
 
 
 def _floor_of(row: ChamberRow) -> float:
@@ -83,7 +168,33 @@ def _roof_of(row: ChamberRow) -> Array:
     return np.stack(steps)
 
 
-def _profile(row: ChamberRow | SlitShell, angle: float, floor: float, upper: Array) -> SideProfile:
+def _lengthened_profile(start: float, end: float, contour: Array, elongation: float) -> SideProfile:
+    """An actuator stretched evenly, from its clamped face to its cap.
+
+    `contour` is its upper outline at rest, (n, 2) as (x, distance from the axis).
+    """
+    x = contour[:, 0] + elongation * (contour[:, 0] - start) / (end - start)
+    r, half = contour[:, 1], float(contour[:, 1].max())
+    cap = end + elongation
+    # one on the connector's front, one below the cap, both on the axis
+    fixed = start - CONNECTOR_THICKNESS + FLAG_PAPER / 2
+    moving = cap + PLATE_THICKNESS + _FLAG_GAP + FLAG_PAPER / 2
+    return SideProfile(
+        connector=_plate(start - CONNECTOR_THICKNESS, start, half + _CONNECTOR_MARGIN),
+        bellow=np.concatenate((np.column_stack((x, -r)), np.column_stack((x, r))[::-1])),
+        bottom_layer=None,
+        end_cap=_plate(cap, cap + PLATE_THICKNESS, half),
+        flags=np.array([[fixed, 0.0], [moving, 0.0]]),
+    )
+
+
+def _plate(near: float, far: float, half: float) -> Array:
+    return np.array([[near, -half], [far, -half], [far, half], [near, half]])
+
+
+def _bent_profile(
+    row: ChamberRow | SlitShell, angle: float, floor: float, upper: Array
+) -> SideProfile:
     """An actuator bent to an arc about its underside, sections plane."""
     near, top = row.start, row.height
     upper[[0, -1], 1] = floor

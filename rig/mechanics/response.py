@@ -147,8 +147,16 @@ class SideProfile:
 
     connector: Array
     bellow: Array
-    bottom_layer: Array
+    bottom_layer: Array | None
+    """None of an actuator that lengthens."""
     end_cap: Array
+    flags: Array | None = None
+    """Centres (2, 2) of the markers on connector and end cap of an actuator that lengthens."""
+
+    @property
+    def soft(self) -> tuple[Array, ...]:
+        """Outlines of what deforms, from front to back where one hides the other."""
+        return (self.bellow,) if self.bottom_layer is None else (self.bottom_layer, self.bellow)
 
 
 def _millilitres(volume: float) -> float:

@@ -73,7 +73,7 @@ def beam_truth(
     geometry = bending_geometry(printed, "The virtual bench")
     _require_difference(pressure, angle, actuator, material)
     return TruthTables(
-        angle=angle,
+        deformation=angle,
         blocked_force=stiffened(force_slope * pressure, force_slope * limit, strength),
         volume_free=_volume(geometry, angle),
         volume_blocked=_volume(geometry, _turn_when_blocked(geometry) * bend),

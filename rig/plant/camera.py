@@ -10,8 +10,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.mechanics.outline import side_profile
+from rig.mechanics.outline import FLAG_SIDE, side_profile
+from rig.mechanics.response import SideProfile
 from rig.plant.layout import ProfileFunction, lay_out
+from rig.plant.markers import marker_surfaces
 from rig.plant.optics import Lens, draw_lens, draw_projection
 from rig.plant.scene import Image, Light, Scene, Surface, linear
 from rig.spec.actuator import Geometry
@@ -102,10 +104,10 @@ class VirtualCamera:
 
     `rng` draws the lens, how square the ruler is, how crooked the camera stands, the direction of
     the light, the background, the noise and the latency, `latency_s`, which whoever asks for a
-    picture has to mind; the same generator state gives the same camera, and the same angle and time
-    the same picture, however many were taken before. `profile` gives the actuator's outlines.
-    `fault` may be set at any time. Raises SceneError if actuator and ruler do not fit into the
-    picture.
+    picture has to mind; the same generator state gives the same camera, and the same deformation
+    and time the same picture, however many were taken before. `profile` gives the actuator's
+    outlines. `fault` may be set at any time. Raises SceneError if actuator and ruler do not fit
+    into the picture.
     """
 
     def __init__(
@@ -145,25 +147,38 @@ class VirtualCamera:
         ]
         self._last: bytes | None = None
 
-    def render(self, angle: float, time_s: float) -> NDArray[np.uint8]:
-        """The picture (height, width, 3), BGR, at the bending `angle` in rad, before JPEG."""
+    def render(self, deformation: float, time_s: float) -> NDArray[np.uint8]:
+        """The picture (height, width, 3), BGR, before JPEG, at a bending angle in rad or an
+        elongation in m."""
         if self.fault is CameraFault.DARK:
             shape = (self.projection.height, self.projection.width, 3)
             return self._noise.added(np.full(shape, _BLACK_LEVEL, np.uint8), time_s)
-        profile = self._profile(self._geometry, angle)
-        before = []
+        profile = self._profile(self._geometry, deformation)
+        before = self._flags(profile)
         if self.fault is CameraFault.OCCLUDED_CAP:
-            bar = self.layout.place(profile.end_cap).mean(axis=0) + _BAR
+            seen = profile.end_cap if profile.flags is None else profile.flags[1:]
+            bar = self.layout.place(seen).mean(axis=0) + _BAR
             before.append(Surface(bar, _BAR_COLOUR))
         return self._noise.added(self._scene.picture(profile, before), time_s)
 
-    def grab(self, angle: float, time_s: float) -> bytes:
-        """A JPEG as the camera delivers it, of the bending `angle` (rad) at `time_s` (s).
+    def _flags(self, profile: SideProfile) -> list[Surface]:
+        """The markers of an actuator that lengthens."""
+        if profile.flags is None:
+            return []
+        centres = self.layout.place(profile.flags)
+        return [
+            surface
+            for name, centre in enumerate(centres)
+            for surface in marker_surfaces(name, FLAG_SIDE, centre)
+        ]
+
+    def grab(self, deformation: float, time_s: float) -> bytes:
+        """A JPEG as the camera delivers it, of `deformation` (rad or m) at `time_s` (s).
 
         A frozen camera repeats its last picture; if there is none, it takes this one first.
         """
         if self.fault is CameraFault.FROZEN and self._last is not None:
             return self._last
-        _, encoded = cv2.imencode(".jpg", self.render(angle, time_s), self._encoding)
+        _, encoded = cv2.imencode(".jpg", self.render(deformation, time_s), self._encoding)
         self._last = encoded.tobytes()
         return self._last

@@ -1,31 +1,37 @@
-"""How the actuator's mass slows its bending: one generalised coordinate, its shape.
+"""How the actuator's mass slows its deformation u: one generalised coordinate, its shape.
 
-Rayleigh's quotient with the arc that a constant curvature makes. Told by the pressure s of the
-quasi-static response, the shape has the kinetic energy 1/2 J (dtheta/ds)^2 s'^2 and takes the work
+Rayleigh's quotient with the arc that a constant curvature makes, or an even stretch. Told by the
+pressure s of the
+quasi-static response, the shape has the kinetic energy 1/2 J (du/ds)^2 s'^2 and takes the work
 s dV from the fluid, so its elastic energy is 1/2 (dV/ds) s^2, and
 
-    J (dtheta/ds)^2 s'' + (dV/ds) s = (dV/ds) p.
+    J (du/ds)^2 s'' + (dV/ds) s = (dV/ds) p.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from rig.mechanics.outline import bending_shape
+from rig.mechanics.outline import body_of
 from rig.plant.specimen import Specimen
 
 
-def moment_of_inertia(specimen: Specimen, fluid_density: float) -> float:
-    """Of bending, about the clamped end, in kg m2: kinetic energy over half the tip's rate squared.
+def deformation_inertia(specimen: Specimen, fluid_density: float) -> float:
+    """Kinetic energy over half the squared rate of the deformation: in kg m2 of bending about the
+    clamped end, in kg of lengthening.
 
-    A slice at x goes sideways by theta x^2 / 2 L: what is spread along the length L counts L^2/20,
-    the cap at its end L^2/4. `fluid_density` in kg/m3 is of what fills the cavity.
+    Bent, a slice at x goes sideways by theta x^2 / 2 L: what is spread along the length L counts
+    L^2/20, the cap at its end L^2/4. Stretched evenly, it moves by d x / L: a third and one.
+    `fluid_density` in kg/m3 is of what fills the cavity.
     """
-    shape = bending_shape(specimen.geometry)
+    body = body_of(specimen.geometry)
     cavity = float(np.interp(0.0, specimen.pressure, specimen.volume_free))
-    spread = shape.soft_mass(specimen.density) + fluid_density * cavity
-    square = shape.effective_length**2
-    return spread * square / 20 + shape.cap_mass(specimen.density) * square / 4
+    spread = body.soft_mass(specimen.density) + fluid_density * cavity
+    cap = body.cap_mass(specimen.density)
+    if specimen.geometry.deformation == "elongation":
+        return spread / 3 + cap
+    square = body.effective_length**2
+    return spread * square / 20 + cap * square / 4
 
 
 def shape_inertia(specimen: Specimen, pressure_limit: float, fluid_density: float) -> float:
@@ -35,6 +41,6 @@ def shape_inertia(specimen: Specimen, pressure_limit: float, fluid_density: floa
     frequency of the actuator at a held pressure.
     """
     ends = np.array([0.0, pressure_limit])
-    turn = float(np.diff(np.interp(ends, specimen.pressure, specimen.angle))[0])
+    moved = float(np.diff(np.interp(ends, specimen.pressure, specimen.deformation))[0])
     growth = float(np.diff(np.interp(ends, specimen.pressure, specimen.volume_free))[0])
-    return moment_of_inertia(specimen, fluid_density) * turn**2 / (growth * pressure_limit)
+    return deformation_inertia(specimen, fluid_density) * moved**2 / (growth * pressure_limit)

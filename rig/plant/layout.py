@@ -10,20 +10,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rig.mechanics.outline import FLAG_PAPER
 from rig.mechanics.response import SideProfile
 from rig.plant.errors import SceneError
 from rig.plant.optics import Array, Projection
 from rig.spec.actuator import Geometry
 from rig.spec.calibration import RulerCalibration
+from rig.spec.measurand import Deformation
 
 ProfileFunction = Callable[[Geometry, float], SideProfile]
-"""Side profile of a geometry at a bending angle in rad."""
+"""Side profile of a geometry at a bending angle in rad or an elongation in m."""
 
 RULER_WIDTH = 0.012
 MARK_DIAMETER = 0.003
-ANGLE_RANGE = (np.deg2rad(-10.0), np.deg2rad(150.0))
-"""Bending angles, rad, at which the whole actuator must be in the picture."""
+RANGES: dict[Deformation, tuple[float, float]] = {
+    "bending": (np.deg2rad(-10.0), np.deg2rad(150.0)),
+    "elongation": (-0.002, 0.024),
+}
+"""Bending angles in rad or elongations in m at which all of an actuator must be in the picture."""
 
+_PAPER = FLAG_PAPER / 2 * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
 _VISIBLE_FRAME = 0.08  # of the height of the view
 _MARGIN = 0.035  # kept free along the borders of the picture, of the height of the view
 _CLEARANCE = 0.004  # between the actuator and the ruler, metres
@@ -83,7 +89,7 @@ def lay_out(
     projection: Projection,
     profile: ProfileFunction,
 ) -> Layout:
-    """Place frame, actuator and ruler so that the camera sees all of them over `ANGLE_RANGE`.
+    """Place frame, actuator and ruler so that the camera sees all of them over their `RANGES`.
 
     Raises SceneError if they do not fit into the picture.
     """
@@ -123,9 +129,11 @@ def lay_out(
 
 def _swept_outlines(geometry: Geometry, profile: ProfileFunction) -> list[Array]:
     outlines = []
-    for angle in np.linspace(*ANGLE_RANGE, 17):
-        shape = profile(geometry, float(angle))
-        outlines += [shape.connector, shape.bellow, shape.bottom_layer, shape.end_cap]
+    for deformation in np.linspace(*RANGES[geometry.deformation], 17):
+        shape = profile(geometry, float(deformation))
+        outlines += [shape.connector, *shape.soft, shape.end_cap]
+        if shape.flags is not None:
+            outlines += [centre + _PAPER for centre in shape.flags]
     return outlines
 
 

@@ -74,7 +74,8 @@ class Truth:
 
     time: float
     gauge_pressure: float
-    angle: float
+    deformation: float
+    """Bending angle in rad or elongation in m."""
     force: float
     actuator_volume: float
     pushed_volume: float
@@ -118,7 +119,7 @@ class ResponseTables(Protocol):
     @property
     def pressure(self) -> Array: ...  # noqa: D102
     @property
-    def angle(self) -> Array: ...  # noqa: D102
+    def deformation(self) -> Array: ...  # noqa: D102
     @property
     def blocked_force(self) -> Array: ...  # noqa: D102
     @property
@@ -137,7 +138,7 @@ class Plant:
         pressure = tables.pressure
         grid = np.linspace(pressure[0], pressure[-1], TABLE_LENGTH)
         self._response.table_low, self._response.table_high = grid[0], grid[-1]
-        for name in ("angle", "blocked_force", "volume_free", "volume_blocked"):
+        for name in ("deformation", "blocked_force", "volume_free", "volume_blocked"):
             values = np.interp(grid, pressure, getattr(tables, name))
             ffi.memmove(getattr(self._response, name), ffi.from_buffer(values), values.nbytes)
         self._plant = ffi.gc(lib.plant_new(self._parameters, self._response, seed), lib.plant_free)

@@ -10,8 +10,9 @@ Everything that stands still is rendered once; a frame only renders the pixels a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 import cv2
 import numpy as np
@@ -122,12 +123,13 @@ class Scene:
     def picture(self, profile: SideProfile, before: Sequence[Surface] = ()) -> Image:
         """The picture (height, width, 3), BGR, 8 bit, without noise, of the deformed actuator.
 
-        The surfaces of `before` hide what is behind them, the first one first.
+        The surfaces of `before` hide what is behind them, the first one first; of equal colours in
+        a row they are one thing, so that neighbours leave no seam.
         """
         place, project = self._layout.place, self._projection.project
         parts = [
             project(densified(place(outline), _OUTLINE_STEP))
-            for outline in (profile.end_cap, profile.bottom_layer, profile.bellow)
+            for outline in (profile.end_cap, *profile.soft)
         ]
         hiding = [project(densified(surface.outline, _OUTLINE_STEP)) for surface in before]
         seen = bounding_box(parts + hiding, self._reach, self._whole)
@@ -138,8 +140,8 @@ class Scene:
         if seen.empty:
             return picture
         light = self._actuator_light(parts, box)
-        for surface, outline in zip(before, hiding, strict=True):
-            light = _over(light, surface.colour[:, None, None], coverage(outline, box))
+        for colour, outlines in _by_colour(before, hiding):
+            light = _over(light, colour[:, None, None], _covered(outlines, box))
         picture[seen.slices] = developed(light, self._blur)[seen.within(box).slices]
         return picture
 
@@ -172,7 +174,8 @@ class Scene:
         cap *= self._light[cap_box.slices]
         _add_light(seen[:, *cap_box.within(box).slices], RIGID_BLUE, cap)
         soft[:] = 0
-        for (part, weight), colour in zip(soft_parts, (BOTTOM_LAYER, BODY), strict=True):
+        colours = (BOTTOM_LAYER, BODY)[-len(soft_parts) :]
+        for (part, weight), colour in zip(soft_parts, colours, strict=True):
             here = part.within(box).slices
             weight *= brightness[here]
             soft[here] += weight
@@ -255,6 +258,25 @@ class Scene:
         box = bounding_box([pixels], 0, self._whole)
         here = light[:, *box.slices]
         here[:] = _over(here, colour[:, None, None], coverage(pixels, box))
+
+
+def _by_colour(
+    surfaces: Sequence[Surface], outlines: Sequence[Array]
+) -> Iterator[tuple[Picture, list[Array]]]:
+    """Runs of surfaces of one colour, with their outlines in pixels."""
+    pairs = zip(surfaces, outlines, strict=True)
+    for _, run in groupby(pairs, key=lambda pair: pair[0].colour.tobytes()):
+        alike = list(run)
+        yield alike[0][0].colour, [outline for _, outline in alike]
+
+
+def _covered(outlines: Sequence[Array], box: Box) -> Picture:
+    """Share of the pixels of `box` that several things of one colour cover."""
+    covered = np.zeros(box.shape, np.float32)
+    for outline in outlines:
+        part = bounding_box([outline], 1, box)
+        covered[part.within(box).slices] += coverage(outline, part)
+    return np.minimum(covered, 1, out=covered)
 
 
 def developed(light: Picture, blur: float) -> Image:

@@ -40,8 +40,8 @@ class Specimen:
 
     pressure: Array
     """Gauge pressure in Pa, uniform, from a slight vacuum to well above the limit."""
-    angle: Array
-    """Bending angle in rad, tip free."""
+    deformation: Array
+    """Bending angle in rad or elongation in m, tip free."""
     blocked_force: Array
     """Force on the stop in N."""
     volume_free: Array
@@ -65,7 +65,7 @@ class Specimen:
         steps = np.diff(self.pressure)
         if not np.allclose(steps, steps[0]):
             raise SpecimenError("The pressures of a specimen's tables must be equally spaced.")
-        for name in ("pressure", "angle", "blocked_force", "volume_free", "volume_blocked"):
+        for name in ("pressure", "deformation", "blocked_force", "volume_free", "volume_blocked"):
             values = getattr(self, name)
             if values.shape != self.pressure.shape or not np.all(np.diff(values) > 0):
                 raise SpecimenError(
@@ -113,7 +113,7 @@ def draw_specimen(
         tables = finite_element_truth(printed, material, stiffness, pressure, job or Job())
     return Specimen(
         pressure=pressure,
-        angle=tables.angle,
+        deformation=tables.deformation,
         blocked_force=tables.blocked_force,
         volume_free=tables.volume_free,
         volume_blocked=tables.volume_blocked,
@@ -131,9 +131,7 @@ def _printed(actuator: ActuatorSpec, wall_factor: float) -> Geometry:
     geometry = actuator.geometry
     thickness = geometry.wall_thickness * wall_factor
     try:
-        return type(geometry).model_validate(
-            geometry.model_dump(mode="json") | {"wall_thickness": f"{thickness!r} m"}
-        )
+        return geometry.with_wall(thickness)
     except ValidationError as error:
         raise SpecimenError(
             f"The virtual specimen of '{actuator.name}' came out with a wall of "

@@ -13,6 +13,7 @@ import numpy as np
 from rig.plant.camera import CameraStreams, SensorNoise
 from rig.plant.coverage import Box, Picture, bounding_box, coverage
 from rig.plant.layout import MARK_DIAMETER, RULER_WIDTH, mark_centres, ruler_outline
+from rig.plant.markers import black_cells, rectangle
 from rig.plant.optics import Array, Lens, aim
 from rig.plant.scene import (
     BACKGROUND,
@@ -42,7 +43,7 @@ def board_surfaces(target: CharucoTarget) -> tuple[list[Surface], Array]:
     half = 0.5 * target.square * np.array([target.columns, target.rows])
     margin = half + _BORDER * target.square
     cell = float(2 * half[0] / cells.shape[1])
-    surfaces = [Surface(_rectangle(-margin, margin), MATTE_WHITE), *_black(cells, cell, -half)]
+    surfaces = [Surface(rectangle(-margin, margin), MATTE_WHITE), *black_cells(cells, cell, -half)]
     return surfaces, 2 * margin
 
 
@@ -120,24 +121,6 @@ def flat_light(outlines: Iterable[tuple[Array, Surface]], whole: Box) -> Picture
     return light
 
 
-def marker_surfaces(name: int, side: float, centre: Array) -> list[Surface]:
-    """Marker `name` of OpenCV's dictionary 4X4_50, its black square `side` metres, on white."""
-    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
-    cells = np.asarray(dictionary.generateImageMarker(name, 6) < 128, dtype=np.float64)
-    half = np.full(2, 0.5 * side)
-    paper = _rectangle(centre - 1.5 * half, centre + 1.5 * half)
-    return [Surface(paper, MATTE_WHITE), *_black(cells, side / 6, centre - half)]
-
-
-def _black(cells: Array, cell: float, corner: Array) -> Iterator[Surface]:
-    """The black cells of a pattern, row by row, neighbours in one piece."""
-    for row, line in enumerate(cells):
-        edges = np.flatnonzero(np.diff(np.concatenate(([0], line, [0]))))
-        for start, stop in edges.reshape(-1, 2):
-            low, high = np.array([(start, row), (stop, row + 1)]) * cell + corner
-            yield Surface(_rectangle(low, high), MARK_BLACK)
-
-
 def _cells(target: CharucoTarget) -> Array:
     """The board (rows, columns) in cells as fine as the bits of its markers: 1 is black."""
     across = round(6 * target.square / target.marker)
@@ -146,8 +129,3 @@ def _cells(target: CharucoTarget) -> Array:
     board = cv2.aruco.CharucoBoard(shape, float(across), 6.0, dictionary)
     image = board.generateImage((target.columns * across, target.rows * across), marginSize=0)
     return np.asarray(image < 128, dtype=np.float64)
-
-
-def _rectangle(low: Array, high: Array) -> Array:
-    (left, top), (right, bottom) = low, high
-    return np.array([(left, top), (right, top), (right, bottom), (left, bottom)])

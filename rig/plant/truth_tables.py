@@ -14,8 +14,8 @@ Array = NDArray[np.float64]
 class TruthTables:
     """Quasi-static response over the specimen's pressures; each (n,), SI units."""
 
-    angle: Array
-    """Bending angle in rad, tip free."""
+    deformation: Array
+    """Bending angle in rad or elongation in m, tip free."""
     blocked_force: Array
     """Force on the stop in N."""
     volume_free: Array

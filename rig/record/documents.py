@@ -9,6 +9,8 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict
 
+from rig.spec.measurand import DeformationUnit
+
 ExperimentName = Literal["deformation", "blocked_force"]
 Direction = Literal["up", "down"]
 ExitStatus = Literal["success", "aborted", "failed"]
@@ -78,7 +80,8 @@ class PointDocument(Document):
     pressure_u_kpa: float
     """Combined standard uncertainty of `pressure_kpa`: readings and calibration."""
     value: float | None
-    """Angle in degrees (deformation) or force in grams (blocked force); None if all rejected."""
+    """Angle in degrees or elongation in mm (deformation), force in grams (blocked force); None if
+    all were rejected."""
     value_sd: float
     """Standard deviation of single readings."""
     value_u: float
@@ -87,20 +90,25 @@ class PointDocument(Document):
     """The budget of `value_u`."""
     pressure_parts: tuple[UncertaintyPart, ...]
     """The budget of `pressure_kpa`."""
-    unit: Literal["deg", "g"]
+    unit: Literal["deg", "mm", "g"]
     readings: int
     """Accepted readings behind `value`."""
     rejected: tuple[str, ...]
     """A reason for each reading not used."""
 
 
-class AngleReading(Document):
+class DeformationReading(Document):
     """Vision result of one camera frame of a point."""
 
     key: PointKey
     frame: int
-    angle_deg: float | None
-    u_deg: float
+    value: float | None
+    """Bending angle in degrees or elongation in mm."""
+    unit: DeformationUnit
+    u: float
+    """Standard uncertainty of `value`, in its unit."""
+    parts: tuple[UncertaintyPart, ...]
+    """The budget of `u`."""
     quality: float
     accepted: bool
     reason: str
@@ -125,7 +133,7 @@ class PartDocument(Document):
     plunger_from_ml: float
     """Where the plunger stood when the part began; volumes of the trial count from there."""
     looks: int
-    """Frames whose angle was accepted."""
+    """Frames that were accepted."""
     rejected: tuple[str, ...]
     """A reason for each of the others."""
     notes: tuple[str, ...]
@@ -133,13 +141,15 @@ class PartDocument(Document):
 
 
 class LookDocument(Document):
-    """The angle in one camera frame of a trial."""
+    """The deformation in one camera frame of a trial."""
 
     key: PartKey
     time_s: float
     """Since the part began."""
-    angle_deg: float | None
-    u_deg: float
+    value: float | None
+    """Bending angle in degrees or elongation in mm."""
+    unit: DeformationUnit
+    u: float
     accepted: bool
     reason: str
 

@@ -1,11 +1,11 @@
-"""The Foxglove layout that ships beside a run: pressure, angle, load, camera and log in step."""
+"""The Foxglove layout that ships beside a run: pressure, deformation, load, camera, log in step."""
 
 from __future__ import annotations
 
 import json
 from typing import Any
 
-from rig.record.channels import ANGLE_TOPIC, CAMERA_TOPIC, LOG_TOPIC, telemetry_topic
+from rig.record.channels import CAMERA_TOPIC, DEFORMATION_TOPIC, LOG_TOPIC, telemetry_topic
 
 LAYOUT_FILE = "foxglove-layout.json"
 
@@ -22,7 +22,9 @@ def foxglove_layout() -> str:
                 f"{pressure}.setpoint_kpa": "set-point",
             },
         ),
-        "Plot!angle": _plot("Bending angle (deg)", {f"{ANGLE_TOPIC}.angle_deg": "angle"}),
+        "Plot!deformation": _plot(
+            "Bending angle (deg) or elongation (mm)", {f"{DEFORMATION_TOPIC}.value": "deformation"}
+        ),
         "Plot!load": _plot("Load cell (counts)", {f"{load_cell}.load_cell_counts": "counts"}),
         "Image!camera": {"imageMode": {"imageTopic": CAMERA_TOPIC}},
         "Log!events": {"topicToRender": LOG_TOPIC, "searchTerms": [], "minLogLevel": 1},
@@ -32,7 +34,7 @@ def foxglove_layout() -> str:
         "first": {
             "direction": "column",
             "first": "Plot!pressure",
-            "second": {"direction": "column", "first": "Plot!angle", "second": "Plot!load"},
+            "second": {"direction": "column", "first": "Plot!deformation", "second": "Plot!load"},
             "splitPercentage": 34,
         },
         "second": {

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from rig.record.channels import (
-    ANGLE_TOPIC,
     CAMERA_KEY_TOPIC,
     CAMERA_TOPIC,
     CAN_TOPIC,
+    DEFORMATION_TOPIC,
     GAS_TOPIC,
     LEVELS,
     LOG_FILE,
@@ -27,6 +27,7 @@ from rig.record.channels import (
     LOOKS_TOPIC,
     PARTS_TOPIC,
     POINTS_TOPIC,
+    REST_TOPIC,
     RESUME_METADATA,
     START_METADATA,
     STOP_METADATA,
@@ -35,7 +36,7 @@ from rig.record.channels import (
     telemetry_topic,
 )
 from rig.record.documents import (
-    AngleReading,
+    DeformationReading,
     Document,
     GasDocument,
     LookDocument,
@@ -159,21 +160,30 @@ class RunReader:
         """Every complete point in the order of measurement."""
         return self._documents(POINTS_TOPIC, PointDocument)
 
-    def angle_readings(self) -> tuple[AngleReading, ...]:
+    def deformation_readings(self) -> tuple[DeformationReading, ...]:
         """Every vision result in the order of measurement."""
-        return self._documents(ANGLE_TOPIC, AngleReading)
+        return self._documents(DEFORMATION_TOPIC, DeformationReading)
 
     def parts(self) -> tuple[PartDocument, ...]:
         """Every complete part of the trials in the order of measurement."""
         return self._documents(PARTS_TOPIC, PartDocument)
 
     def looks(self) -> tuple[LookDocument, ...]:
-        """The angles that were looked at in trials, in order."""
+        """The deformations that were looked at in trials, in order."""
         return self._documents(LOOKS_TOPIC, LookDocument)
 
     def gas(self) -> tuple[GasDocument, ...]:
         """What the gas did each time the valve was closed."""
         return self._documents(GAS_TOPIC, GasDocument)
+
+    def rest_image(self) -> bytes | None:
+        """JPEG of the actuator at rest, from which elongations count; None if there is none."""
+        for topic, _, data in self._messages(REST_TOPIC):
+            try:
+                return bytes(CompressedImage.FromString(data).data)
+            except DecodeError as error:
+                raise self._foreign(topic, error) from error
+        return None
 
     def images(self) -> Iterator[CameraImage]:
         """Every recorded image, one at a time."""

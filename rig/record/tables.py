@@ -1,4 +1,4 @@
-"""A run's points, angles and pressure as CSV tables; units stand in the headers."""
+"""A run's points, deformations and pressure as CSV tables; units stand in them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ KEY_COLUMNS = ("experiment", "repeat", "direction", "target_kpa")
 
 
 def write_tables(reader: RunReader, folder: Path) -> tuple[Path, ...]:
-    """Write points.csv, angles.csv, pressure.csv, and looks.csv if there were trials.
+    """Write points.csv, deformations.csv, pressure.csv, and looks.csv if there were trials.
 
     Returns their paths.
 
@@ -26,7 +26,7 @@ def write_tables(reader: RunReader, folder: Path) -> tuple[Path, ...]:
     looks = ((folder / "looks.csv", LOOK_COLUMNS, _looks(reader)),) if reader.parts() else ()
     return (
         _write(folder / "points.csv", POINT_COLUMNS, _points(reader)),
-        _write(folder / "angles.csv", ANGLE_COLUMNS, _angles(reader)),
+        _write(folder / "deformations.csv", DEFORMATION_COLUMNS, _deformations(reader)),
         _write(folder / "pressure.csv", PRESSURE_COLUMNS, _pressure(reader)),
         *(_write(*table) for table in looks),
     )
@@ -48,10 +48,13 @@ POINT_COLUMNS = (
     "readings",
     "rejected",
 )
-ANGLE_COLUMNS = (*KEY_COLUMNS, "frame", "angle_deg", "u_deg", "quality", "accepted", "reason")
+DEFORMATION_COLUMNS = (
+    *KEY_COLUMNS,
+    *("frame", "value", "u", "unit", "quality", "accepted", "reason"),
+)
 LOOK_COLUMNS = (
     *("trial", "kind", "repeat", "part", "time_s", "pressure_kpa", "plunger_ml"),
-    *("angle_deg", "u_deg", "accepted", "reason"),
+    *("value", "u", "unit", "accepted", "reason"),
 )
 PRESSURE_COLUMNS = ("time_s", "pressure_mean_kpa", "pressure_min_kpa", "pressure_max_kpa")
 
@@ -68,17 +71,17 @@ def _points(reader: RunReader) -> Iterable[Sequence[object]]:
         )
 
 
-def _angles(reader: RunReader) -> Iterable[Sequence[object]]:
-    for r in reader.angle_readings():
+def _deformations(reader: RunReader) -> Iterable[Sequence[object]]:
+    for r in reader.deformation_readings():
         yield (
             *(r.key.experiment, r.key.repeat, r.key.direction, r.key.target_kpa),
-            *(r.frame, _number(r.angle_deg), _number(r.u_deg), _number(r.quality)),
+            *(r.frame, _number(r.value), _number(r.u), r.unit, _number(r.quality)),
             *(r.accepted, r.reason),
         )
 
 
 def _looks(reader: RunReader) -> Iterable[Sequence[object]]:
-    """Angles of trials with pressure and plunger (from where the part began) at that time."""
+    """Deformations of trials with pressure and plunger (from where the part began) at that time."""
     pressure = reader.telemetry("PRESSURE")
     parts = {part.key: part for part in reader.parts()}
     for look in reader.looks():
@@ -91,7 +94,7 @@ def _looks(reader: RunReader) -> Iterable[Sequence[object]]:
         yield (
             *(look.key.trial, look.key.kind, look.key.repeat, look.key.part, _time(look.time_s)),
             *(_number(kpa), _number(ml - part.plunger_from_ml)),
-            *(_number(look.angle_deg), _number(look.u_deg), look.accepted, look.reason),
+            *(_number(look.value), _number(look.u), look.unit, look.accepted, look.reason),
         )
 
 

@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 import rig
 from rig.record.bulk_writer import BulkWriter, times_to_ns
 from rig.record.channels import (
-    ANGLE_TOPIC,
     CAMERA_KEY_TOPIC,
     CAMERA_TOPIC,
     CAN_TOPIC,
+    DEFORMATION_TOPIC,
     GAS_TOPIC,
     LEVELS,
     LOG_FILE,
@@ -33,6 +33,7 @@ from rig.record.channels import (
     LOOKS_TOPIC,
     PARTS_TOPIC,
     POINTS_TOPIC,
+    REST_TOPIC,
     RESUME_METADATA,
     START_METADATA,
     STOP_METADATA,
@@ -45,7 +46,7 @@ from rig.record.channels import (
     telemetry_topic,
 )
 from rig.record.documents import (
-    AngleReading,
+    DeformationReading,
     Document,
     GasDocument,
     LookDocument,
@@ -256,19 +257,21 @@ class RunWriter:
         camera = self._log.register(CAMERA_TOPIC, "protobuf", protobuf_schema(CompressedImage))
         keys = self._log.register(CAMERA_KEY_TOPIC, "json", camera_key_schema())
         times_ns = times_to_ns((time_s,))
-        image = CompressedImage(
-            timestamp=_timestamp(times_ns[0]), frame_id="camera", data=jpeg, format="jpeg"
-        )
         note: dict[str, Any] = {"frame": frame}
         if key is not None:
             note |= key.model_dump()
         # The note goes first: an image that can be read always has its note.
         self._log.add("camera", keys, times_ns, [json.dumps(note).encode()])
-        self._log.add("camera", camera, times_ns, [image.SerializeToString()])
+        self._log.add("camera", camera, times_ns, [_image(time_s, jpeg)])
 
-    def angle(self, reading: AngleReading, time_s: float) -> None:
+    def rest(self, time_s: float, jpeg: bytes) -> None:
+        """The camera image of the actuator at rest, from which elongations count."""
+        channel = self._log.register(REST_TOPIC, "protobuf", protobuf_schema(CompressedImage))
+        self._log.add("camera", channel, times_to_ns((time_s,)), [_image(time_s, jpeg)])
+
+    def deformation(self, reading: DeformationReading, time_s: float) -> None:
         """What vision made of one image."""
-        self._document(ANGLE_TOPIC, reading, time_s)
+        self._document(DEFORMATION_TOPIC, reading, time_s)
 
     def event(
         self, time_s: float, name: str, data: Mapping[str, Any], level: Level = "info"
@@ -295,7 +298,7 @@ class RunWriter:
         self._log.sync()
 
     def look(self, document: LookDocument, time_s: float) -> None:
-        """The angle in one frame of a trial."""
+        """The deformation in one frame of a trial."""
         self._document(LOOKS_TOPIC, document, time_s)
 
     def part(self, document: PartDocument, time_s: float) -> None:
@@ -339,6 +342,16 @@ class RunWriter:
         channel_id = self._log.register(topic, "json", document_schema(type(document)))
         data = document.model_dump_json(exclude_none=True).encode()
         self._log.add(topic, channel_id, times_to_ns((time_s,)), [data])
+
+
+def _image(time_s: float, jpeg: bytes) -> bytes:
+    image = CompressedImage(
+        timestamp=_timestamp(times_to_ns((time_s,))[0]),
+        frame_id="camera",
+        data=jpeg,
+        format="jpeg",
+    )
+    return bytes(image.SerializeToString())
 
 
 def require_free_folder(folder: Path) -> None:

@@ -43,9 +43,9 @@ from rig.report.summary import (
     StepSummary,
     ValidationSummary,
 )
+from rig.spec.measurand import MEASURANDS
 from rig.spec.published import PublishedReference
 from rig.spec.quantity import STANDARD_GRAVITY
-from rig.spec.workspace import Setup
 from rig.validate.metrics import (
     ComparisonErrors,
     ValidationStatement,
@@ -63,11 +63,6 @@ from rig.validate.uncertainty import Component, Estimate, combine, coverage_fact
 Array = NDArray[np.float64]
 PRESSURE_NOISE_KPA = 0.03
 """A mean pressure may lie this far beyond where a model ends and still be compared with it."""
-QUANTITIES: dict[ExperimentName, str] = {
-    "deformation": "bending angle",
-    "blocked_force": "blocked force",
-}
-UNITS: dict[ExperimentName, str] = {"deformation": "deg", "blocked_force": "g"}
 
 
 def build_summary(
@@ -133,9 +128,11 @@ def _ending(reader: RunReader) -> tuple[ExitStatus, str]:
 
 
 def predicted_value(response: Response, experiment: ExperimentName) -> Array | None:
-    """What a model says of an experiment, in deg or grams-force; None if it says nothing."""
+    """What a model says of an experiment, in deg, mm or grams-force; None if it says nothing."""
     if experiment == "deformation":
-        return None if response.angle is None else np.degrees(response.angle)
+        if response.angle is None:
+            return MEASURANDS["elongation"].per_si * response.displacement
+        return MEASURANDS["bending"].per_si * response.angle
     if response.blocked_force is None:
         return None
     return response.blocked_force / STANDARD_GRAVITY * 1e3
@@ -151,18 +148,18 @@ def _experiment(
     levels = levels_of(points)
     up = [level for level in levels if level.direction == "up"]
     span = max(v.mean for v in up) - min(v.mean for v in up) if up else None
-    section = data.section(name)
+    section, unit = data.section(name), data.unit(name)
     return ExperimentSummary(
-        quantity=QUANTITIES[name],
-        unit=UNITS[name],
+        quantity=data.quantity(name),
+        unit=unit,
         planned=planned_points(section) if section is not None else len(points),
         measured=len(points),
         span=span,
-        points=tuple(_level_summary(level, points, UNITS[name]) for level in levels),
-        repeatability=_repeatability(levels, UNITS[name]),
-        hysteresis=_hysteresis(points, UNITS[name]),
+        points=tuple(_level_summary(level, points, unit) for level in levels),
+        repeatability=_repeatability(levels, unit),
+        hysteresis=_hysteresis(points, unit),
         controller=_controller(data, points, name),
-        models=_models(name, up, predictions, span, data.setup),
+        models=_models(name, up, predictions, span, data),
         references=_references(name, data, references),
     )
 
@@ -326,7 +323,7 @@ def _models(
     levels: Sequence[Level],
     predictions: Mapping[str, Response],
     span: float | None,
-    setup: Setup,
+    data: RunData,
 ) -> dict[str, ModelSummary]:
     found = {}
     for model, response in predictions.items():
@@ -335,7 +332,7 @@ def _models(
         curve = ModelCurve(response, name)
         covered = [v for v in levels if curve.reaches(float(v.pressures_kpa.mean()))]
         if covered:
-            found[model] = _model(model, name, covered, curve, span or 0.0, setup)
+            found[model] = _model(model, name, covered, curve, span or 0.0, data)
     return found
 
 
@@ -362,13 +359,13 @@ class ModelCurve:
         return float(known[-1]) if known.size else -math.inf
 
     def value(self, pressures_kpa: Array) -> Array:
-        """Prediction in deg or grams-force, the shape of `pressures_kpa`."""
+        """Prediction in deg, mm or grams-force, the shape of `pressures_kpa`."""
         predicted = predicted_value(self.response.at(self._inside(pressures_kpa)), self.experiment)
         assert predicted is not None
         return predicted
 
     def slope(self, pressure_kpa: float) -> float:
-        """Its slope in deg or grams-force per kPa."""
+        """Its slope in deg, mm or grams-force per kPa."""
         around = self._inside(np.array([pressure_kpa - 0.05, pressure_kpa + 0.05])) / 1e3
         low, high = self.value(around)
         return float((high - low) / (around[1] - around[0]))
@@ -383,9 +380,9 @@ def _model(
     levels: Sequence[Level],
     curve: ModelCurve,
     span: float,
-    setup: Setup,
+    data: RunData,
 ) -> ModelSummary:
-    unit = UNITS[name]
+    unit, setup = data.unit(name), data.setup
     inputs = input_uncertainty(
         setup.actuator,
         setup.material,

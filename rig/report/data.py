@@ -54,6 +54,15 @@ class RunData:
         protocol = self.setup.protocol
         return protocol.deformation if experiment == "deformation" else protocol.blocked_force
 
+    def quantity(self, experiment: ExperimentName) -> str:
+        """What an experiment measures, in prose."""
+        measurand = self.setup.actuator.measurand
+        return measurand.quantity if experiment == "deformation" else "blocked force"
+
+    def unit(self, experiment: ExperimentName) -> str:
+        """Unit of what it measures."""
+        return self.setup.actuator.measurand.unit if experiment == "deformation" else "g"
+
     @cached_property
     def highest_kpa(self) -> float:
         """Highest pressure that any measured point asked for or reached."""

@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.experiment.evaluate import component_of
 from rig.record.documents import Direction, PointDocument, UncertaintyPart
 from rig.report.data import by_level
-from rig.validate.budget import READINGS
+from rig.validate.budget import READINGS, averaged
 from rig.validate.metrics import Repeatability, repeatability
 from rig.validate.uncertainty import Component, Estimate, combine
 
@@ -159,13 +160,6 @@ def pressure_components(group: Sequence[PointDocument]) -> tuple[Component, ...]
     return tuple(components)
 
 
-def averaged(lines: Sequence[Component]) -> Component:
-    """One error common to several results, as it acts on their mean."""
-    u = math.sqrt(float(np.mean([line.u**2 for line in lines])))
-    sensitivity = float(np.mean([line.sensitivity for line in lines]))
-    return replace(lines[0], u=u, sensitivity=sensitivity, dof=min(line.dof for line in lines))
-
-
 def _by_name(
     parts: Iterable[Sequence[UncertaintyPart]],
 ) -> list[tuple[str, list[Component]]]:
@@ -174,12 +168,6 @@ def _by_name(
         for line in lines:
             found.setdefault(line.name, []).append(component_of(line))
     return list(found.items())
-
-
-def component_of(part: UncertaintyPart) -> Component:
-    """A line of a budget as it was recorded."""
-    values = part.model_dump()
-    return Component(**values | {"dof": math.inf if part.dof is None else part.dof})
 
 
 def _slope(branch: Mapping[float, float], target: float) -> float:

@@ -177,6 +177,10 @@ def render_strength(strength: StrengthSection, title: str) -> str:
     return environment().get_template("view3d_page.html.j2").render(strength=strength, title=title)
 
 
+DOES = {"deg": "bends", "mm": "lengthens"}
+"""What an actuator does whose deformation has that unit."""
+
+
 def headline(summary: RunSummary) -> tuple[str, ...]:
     """The run in a sentence or two, with its numbers."""
     at_top: dict[float, list[str]] = {}
@@ -186,7 +190,7 @@ def headline(summary: RunSummary) -> tuple[str, ...]:
             top = max(up, key=lambda level: level.pressure_kpa)
             value = uncertain(top.mean, top.u95, experiment.unit)
             does = (
-                f"bends by {value}"
+                f"{DOES[experiment.unit]} by {value}"
                 if name == "deformation"
                 else f"presses with {value} when blocked"
             )

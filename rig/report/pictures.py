@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from rig.experiment.deformation import DeformationMeter, recorded_meter
 from rig.record.documents import PointKey
 from rig.report.data import RunData
 from rig.vision.errors import VisionError
-from rig.vision.measure import AngleMeter
-from rig.vision.overlay import draw_overlay
 from rig.vision.segment import Image, decoded
 
 PICTURES = 6
@@ -33,7 +32,9 @@ class Picture:
 def overlay_pictures(data: RunData) -> list[Picture]:
     """Pictures at a few pressures of the first ascending sweep, measured again and drawn on."""
     wanted = _chosen(data)
-    meter = AngleMeter(data.setup.calibrations.camera, data.setup.calibrations.ruler)
+    if not wanted:
+        return []
+    meter = recorded_meter(data.setup, data.reader.rest_image())
     found: dict[PointKey, Picture] = {}
     for image in data.reader.images():
         if image.key in wanted and image.key not in found:
@@ -58,26 +59,25 @@ def _chosen(data: RunData) -> list[PointKey]:
     return [keys[i] for i in np.linspace(0, len(keys) - 1, PICTURES).round().astype(int)]
 
 
-def _picture(meter: AngleMeter, jpeg: bytes, key: PointKey) -> Picture | None:
+def _picture(meter: DeformationMeter, jpeg: bytes, key: PointKey) -> Picture | None:
     frame = decoded(jpeg)
     if frame is None:
         return None
     where = f"{key.target_kpa:g} kPa"
     try:
-        measurement = meter.measure(frame)
+        sight, drawn = meter.drawn(frame)
     except VisionError as error:
         caption = f"{where}: not measured again: {error}"
         return Picture(_embed(frame), caption, f"Camera picture at {where}, without measurement")
-    drawn = _embed(draw_overlay(frame, measurement))
-    if measurement.angle_deg is None:
-        caption = f"{where}: rejected, {measurement.reason}"
-        return Picture(drawn, caption, f"Camera picture at {where}, rejected by vision")
-    caption = f"{where}: {measurement.angle_deg:.2f} deg"
+    if sight.value is None:
+        caption = f"{where}: rejected, {sight.reason}"
+        return Picture(_embed(drawn), caption, f"Camera picture at {where}, rejected by vision")
+    quantity, unit = meter.measurand.quantity, meter.measurand.unit
     alt = (
-        f"Side view of the actuator at {where}; edges of connector and end cap are drawn in, the "
-        f"angle between them is {measurement.angle_deg:.1f} degrees"
+        f"Side view of the actuator at {where} with what was measured drawn in: its {quantity} is "
+        f"{sight.value:.1f} {unit}"
     )
-    return Picture(drawn, caption, alt)
+    return Picture(_embed(drawn), f"{where}: {sight.value:.2f} {unit}", alt)
 
 
 def _embed(image: Image) -> str:

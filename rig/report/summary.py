@@ -1,7 +1,7 @@
 """The result of a run as data: `summary.json` and everything the report shows as a number.
 
-Pressures are in kPa, times in s, angles in deg, forces in grams-force; `u95` is an expanded
-uncertainty for a level of confidence of 95 %. Floats keep six significant digits.
+Pressures are in kPa, times in s, angles in deg, elongations in mm, forces in grams-force; `u95` is
+an expanded uncertainty for a level of confidence of 95 %. Floats keep six significant digits.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.experiment.program import Program, TrialPlan, plan_trials
-from rig.mechanics.outline import bending_shape
+from rig.mechanics.outline import body_of
 from rig.record.documents import LookDocument, PartDocument
 from rig.record.reader import RunReader
 from rig.report.charts import COLOURS, TALL, Chart, finished, stacked, styled
@@ -18,6 +18,7 @@ from rig.report.data import RunData
 from rig.report.sheet_parts import Section, Table
 from rig.report.summary import TrialFigure, TrialSummary
 from rig.report.words import significant
+from rig.spec.measurand import Measurand
 from rig.spec.trial import PullTrial
 from rig.spec.workspace import Setup
 from rig.validate.time_response import (
@@ -53,6 +54,8 @@ class PartData:
     force_time_s: Array
     force_g: Array
     looks: tuple[LookDocument, ...]
+    measurand: Measurand
+    """Of the looks."""
 
     @property
     def asked(self) -> Array:
@@ -70,12 +73,12 @@ class PartData:
         times = self.program.times
         return np.asarray((self.time_s >= times[first]) & (self.time_s <= times[last]))
 
-    def angles(self, from_s: float, to_s: float) -> tuple[Array, Array]:
-        """Times and angles of the accepted looks between two times."""
+    def deformations(self, from_s: float, to_s: float) -> tuple[Array, Array]:
+        """Times and values of the accepted looks between two times."""
         seen = [
-            (look.time_s, look.angle_deg)
+            (look.time_s, look.value)
             for look in self.looks
-            if look.accepted and look.angle_deg is not None and from_s <= look.time_s <= to_s
+            if look.accepted and look.value is not None and from_s <= look.time_s <= to_s
         ]
         table = np.array(seen, dtype=np.float64).reshape(-1, 2)
         return table[:, 0], table[:, 1]
@@ -86,7 +89,7 @@ def trial_data(data: RunData) -> list[tuple[TrialPlan, list[PartData]]]:
     setup = data.setup
     if not setup.protocol.trials:
         return []
-    plans = plan_trials(setup, bending_shape(setup.actuator.geometry).cavity_volume)
+    plans = plan_trials(setup, body_of(setup.actuator.geometry).cavity_volume)
     programs = {program.key: program for plan in plans for program in plan.programs}
     done = [
         _part_data(data.reader, setup, part, programs[part.key]) for part in data.reader.parts()
@@ -112,6 +115,7 @@ def _part_data(reader: RunReader, setup: Setup, part: PartDocument, program: Pro
         cell["time_s"][weighed] - part.from_s,
         np.array([setup.calibrations.load_cell.grams(float(word)) for word in counts]),
         tuple(look for look in reader.looks() if look.key == part.key),
+        setup.actuator.measurand,
     )
 
 
@@ -163,29 +167,30 @@ def _creep(parts: list[PartData]) -> list[TrialFigure]:
     """Of each repeat: how far it crept, the law it followed, what recovery left."""
     figures = []
     for part in parts:
+        unit = part.measurand.unit
         t, repeat = part.program.times, f", repeat {part.part.key.repeat}"
-        _, before = part.angles(-1.0, 0.1 * float(t[1]))
+        _, before = part.deformations(-1.0, 0.1 * float(t[1]))
         for name, begin, end in (("creep", t[1], t[2]), ("recovery", t[3], t[4])):
-            time_s, angle = part.angles(float(begin), float(end) + 0.1)
-            if angle.size < 2:
+            time_s, seen = part.deformations(float(begin), float(end) + 0.1)
+            if seen.size < 2:
                 continue
-            moved = float(angle[-1] - angle[0])
-            figures.append(_figure(f"{name} from the first to the last look{repeat}", moved, "deg"))
-            fit = fit_creep(time_s - begin, angle)
+            moved = float(seen[-1] - seen[0])
+            figures.append(_figure(f"{name} from the first to the last look{repeat}", moved, unit))
+            fit = fit_creep(time_s - begin, seen)
             if fit is None:
                 continue
             for parameter, (value, u) in fit.parameters.items():
-                unit = {"time": "s", "exponent": ""}.get(parameter, "deg")
-                figures.append(_figure(f"{name}: {fit.law} {parameter}{repeat}", value, unit, u))
-            figures.append(_figure(f"{name}: rest of the {fit.law} fit{repeat}", fit.rms, "deg"))
+                its = {"time": "s", "exponent": ""}.get(parameter, unit)
+                figures.append(_figure(f"{name}: {fit.law} {parameter}{repeat}", value, its, u))
+            figures.append(_figure(f"{name}: rest of the {fit.law} fit{repeat}", fit.rms, unit))
             if name == "recovery" and before.size:
-                left = float(angle[-1] - before[0])
-                figures.append(_figure(f"left after recovery{repeat}", left, "deg"))
+                left = float(seen[-1] - before[0])
+                figures.append(_figure(f"left after recovery{repeat}", left, unit))
     return figures
 
 
 def cycle_table(parts: list[PartData]) -> Array:
-    """Rows of cycle number, highest and lowest pressure (kPa), angle at either (deg), (n, 5)."""
+    """Rows of cycle number, highest and lowest pressure (kPa), deformation at either, (n, 5)."""
     rows: list[Array] = []
     for part in parts:
         times, values = part.program.times, part.program.values
@@ -197,7 +202,7 @@ def cycle_table(parts: list[PartData]) -> Array:
         block[:, 0] += 1 + np.arange(tops.size)
         block[:, 1], block[:, 2] = high, low
         for index, (begin, end) in enumerate(pairwise(borders)):
-            _, seen = part.angles(float(begin), float(end) + 0.05)
+            _, seen = part.deformations(float(begin), float(end) + 0.05)
             if seen.size >= 2:
                 block[index, 3:] = seen[-2:]
         rows.append(block)
@@ -205,6 +210,7 @@ def cycle_table(parts: list[PartData]) -> Array:
 
 
 def _cycles(parts: list[PartData]) -> list[TrialFigure]:
+    unit = parts[0].measurand.unit
     first = [p for p in parts if p.part.key.repeat == parts[0].part.key.repeat]
     table = cycle_table(first)
     figures = [
@@ -217,13 +223,13 @@ def _cycles(parts: list[PartData]) -> list[TrialFigure]:
         return figures
     amplitude = seen[:, 3] - seen[:, 4]
     figures += [
-        _figure("first amplitude", float(amplitude[0]), "deg"),
-        _figure("last amplitude", float(amplitude[-1]), "deg"),
+        _figure("first amplitude", float(amplitude[0]), unit),
+        _figure("last amplitude", float(amplitude[-1]), unit),
     ]
     trend = softening(seen[:, 0], amplitude)
     if trend is not None:
         name = "change of the amplitude over ten times the cycles"
-        figures.append(_figure(name, trend.per_decade, "deg", trend.u))
+        figures.append(_figure(name, trend.per_decade, unit, trend.u))
     return figures
 
 
@@ -248,13 +254,13 @@ def _pumping(parts: list[PartData]) -> list[TrialFigure]:
 def _deformation(parts: list[PartData]) -> list[TrialFigure]:
     figures = []
     for part in parts:
-        _, angle = part.angles(-1.0, float(part.program.times[-1]))
+        _, seen = part.deformations(-1.0, float(part.program.times[-1]))
         duration = float(part.program.times[-3])
         repeat = f", repeat {part.part.key.repeat}"
         figures.append(_figure(f"duration of the drive{repeat}", duration, "s"))
-        if angle.size >= 2:
-            moved = float(angle[-1] - angle[0])
-            figures.append(_figure(f"angle that came of it{repeat}", moved, "deg"))
+        if seen.size >= 2:
+            name, moved = part.measurand.quantity, float(seen[-1] - seen[0])
+            figures.append(_figure(f"{name} that came of it{repeat}", moved, part.measurand.unit))
     return figures
 
 
@@ -333,7 +339,7 @@ def _chart(name: str, part: PartData) -> Chart:
     axes[0].plot(part.time_s, part.followed, color=COLOURS["series-1"], lw=1.2)
     axes[0].plot(part.time_s, part.asked, "--", color=COLOURS["series-2"], lw=1.0)
     axes[0].set_ylabel("plunger (mL)" if volume else "pressure (kPa)")
-    time_s, angle = part.angles(-np.inf, np.inf)
+    time_s, seen = part.deformations(-np.inf, np.inf)
     if volume:
         axes[1].plot(part.time_s, part.pressure_kpa, color=COLOURS["series-1"], lw=1.2)
         axes[1].set_ylabel("pressure (kPa)")
@@ -341,7 +347,7 @@ def _chart(name: str, part: PartData) -> Chart:
         axes[1].plot(part.force_time_s, part.force_g, color=COLOURS["series-1"], lw=1.2)
         axes[1].set_ylabel("force (g)")
     else:
-        axes[1].plot(time_s, angle, "o-", color=COLOURS["series-1"], lw=0.8, ms=4)
-        axes[1].set_ylabel("angle (deg)")
+        axes[1].plot(time_s, seen, "o-", color=COLOURS["series-1"], lw=0.8, ms=4)
+        axes[1].set_ylabel(f"{part.measurand.quantity} ({part.measurand.unit})")
     axes[1].set_xlabel("time (s)")
     return finished(figure, name, f"{TITLES[part.program.key.kind]} over time.")

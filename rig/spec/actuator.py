@@ -16,18 +16,21 @@ from rig.spec.chambers import (
     MultiChamberBendingGeometry,
     MultiChamberLinearGeometry,
 )
+from rig.spec.geometry import ActuatorGeometry
+from rig.spec.measurand import MEASURANDS, Measurand
 from rig.spec.quantity import Length, Pressure, Ratio
 from rig.spec.shells import ShellReinforcedBendingGeometry, ShellReinforcedLinearGeometry
 
 ModelName = Literal["beam", "fe"]
 
 
-class BellowBendingGeometry(SpecModel):
+class BellowBendingGeometry(ActuatorGeometry):
     """Bending bellow of Yao, He and Maiolino, Table I; lengths in metres.
 
     Radii are those of the inner surface (the cavity); the wall lies outside.
     """
 
+    deformation = "bending"
     family: Literal["bellow-bending"] = Field(description="which geometry this is")
     effective_length: Length = Field(0.066, gt=0, description="L, length of all convolutions")
     bellow_number: Count = Field(6, le=1000, description="N, convolutions from trough to trough")
@@ -68,13 +71,14 @@ class BellowBendingGeometry(SpecModel):
         return self
 
 
-class BellowAxisymmetricGeometry(SpecModel):
+class BellowAxisymmetricGeometry(ActuatorGeometry):
     """Axisymmetric bellow of Auysakul et al. (Actuators 12 (2023) 300), Table 1; in metres.
 
     It stands on its open base and lengthens. The wall is N equal arcs that bulge outwards; the
     inner contour is the outer one moved inwards by t, measured along the radius.
     """
 
+    deformation = "elongation"
     family: Literal["bellow-axisymmetric"] = Field(description="which geometry this is")
     wall_thickness: Length = Field(0.003, gt=0, description="A: t, along the radius")
     bellow_number: Count = Field(6, le=1000, description="B: N, layers of bellows")
@@ -125,7 +129,7 @@ class BellowAxisymmetricGeometry(SpecModel):
         return self
 
 
-class BellowJointGeometry(SpecModel):
+class BellowJointGeometry(ActuatorGeometry):
     """Joint bellow of Guo et al. (Biocybern. Biomed. Eng. 40 (2020) 1359); in metres.
 
     V-shaped bellows between two discs, blow-moulded, so that the wall is equally thick. Radii and
@@ -133,6 +137,7 @@ class BellowJointGeometry(SpecModel):
     alone, its figure 2 the rest: all other values here are ours, see docs/validation/guo2020.md.
     """
 
+    deformation = "elongation"
     family: Literal["bellow-joint"] = Field(description="which geometry this is")
     bellow_number: Count = Field(14, le=1000, description="V-shaped bellows, trough to trough")
     pitch: Length = Field(0.003, gt=0, description="height of one bellow")
@@ -174,13 +179,15 @@ class BellowJointGeometry(SpecModel):
         return self
 
 
-class BellowGripperGeometry(SpecModel):
+class BellowGripperGeometry(ActuatorGeometry):
     """Gripper of Auysakul et al. (Actuators 12 (2023) 300), Section 6.2: two axisymmetric bellows
     that face each other press a rigid object from both sides; in metres.
 
     The paper states neither the distance of bellows and object nor any friction: both are ours.
     """
 
+    deformation = "elongation"
+    wall_field = ("finger", "wall_thickness")
     family: Literal["bellow-gripper"] = Field(description="which geometry this is")
     finger: BellowAxisymmetricGeometry = Field(description="either bellow")
     held: Literal["cube", "cylinder", "sphere"] = Field(
@@ -262,3 +269,8 @@ class ActuatorSpec(SpecModel):
     predictions: tuple[ModelName, ...] = Field(
         ("beam",), description="models that a run is compared with"
     )
+
+    @property
+    def measurand(self) -> Measurand:
+        """What the camera measures of it."""
+        return MEASURANDS[self.geometry.deformation]

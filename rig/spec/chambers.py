@@ -11,6 +11,7 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from rig.spec.base import Count, SpecModel, require
+from rig.spec.geometry import ActuatorGeometry
 from rig.spec.quantity import Length, Modulus
 
 
@@ -22,7 +23,7 @@ class BellowGroup(SpecModel):
     spacer_length: Length = Field(gt=0, description="between the faces of neighbours")
 
 
-class BellowRectangularGeometry(SpecModel):
+class BellowRectangularGeometry(ActuatorGeometry):
     """Rectangular bellows on a strain-limiting layer (Yin et al., Table I); lengths in metres.
 
     The table swaps wall and face; its caption has the face at 1.2 mm, the thinnest. Its lengths
@@ -32,6 +33,7 @@ class BellowRectangularGeometry(SpecModel):
     default half the bellow's, on the strain-limiting layer.
     """
 
+    deformation = "bending"
     family: Literal["bellow-rectangular"] = Field(description="which geometry this is")
     bellow_number: Count = Field(9, le=200, description="N")
     bellow_length: Length = Field(0.005, gt=0, description="inside, between the two faces")
@@ -95,7 +97,7 @@ class BellowRectangularGeometry(SpecModel):
         return self
 
 
-class _MultiChamberGeometry(SpecModel):
+class _MultiChamberGeometry(ActuatorGeometry):
     """Chambers in a cast block, one wall thickness around and between them (Agarwal et al.).
 
     The design tool's arguments are `--chamber 8 8 2 --wall 7`: height, width and length of a
@@ -136,6 +138,7 @@ class _MultiChamberGeometry(SpecModel):
 class MultiChamberBendingGeometry(_MultiChamberGeometry):
     """On an inextensible layer: silk in 0.75 mm of silicone (Fabrication, step 4); in metres."""
 
+    deformation = "bending"
     family: Literal["multi-chamber-bending"] = Field(description="which geometry this is")
     layer_thickness: Length = Field(0.00075, gt=0, description="silicone with silk in it")
     layer_modulus: Modulus = Field(
@@ -149,4 +152,5 @@ class MultiChamberBendingGeometry(_MultiChamberGeometry):
 class MultiChamberLinearGeometry(_MultiChamberGeometry):
     """Without a layer: lengthens; lengths in metres."""
 
+    deformation = "elongation"
     family: Literal["multi-chamber-linear"] = Field(description="which geometry this is")

@@ -12,11 +12,12 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from rig.spec.base import Count, SpecModel, require
+from rig.spec.base import Count, require
+from rig.spec.geometry import ActuatorGeometry
 from rig.spec.quantity import Length, Modulus, Ratio
 
 
-class _ShellReinforcedGeometry(SpecModel):
+class _ShellReinforcedGeometry(ActuatorGeometry):
     """A soft tube with solid ends inside a stiff shell that slides on it; lengths in metres."""
 
     total_length: Length = Field(0.040, gt=0, description="of the soft core, solid ends included")
@@ -95,6 +96,7 @@ class _ShellReinforcedGeometry(SpecModel):
 class ShellReinforcedBendingGeometry(_ShellReinforcedGeometry):
     """Slits all round but for a strip below, which is bonded to the core; lengths in metres."""
 
+    deformation = "bending"
     family: Literal["shell-reinforced-bending"] = Field(description="which geometry this is")
     slit_number: Count = Field(7, le=200, description="of full width; half ones at both ends")
     slit_width: Length = Field(0.001, gt=0, description="the paper's cut spacing")
@@ -121,6 +123,7 @@ class ShellReinforcedLinearGeometry(_ShellReinforcedGeometry):
     rings between them give way.
     """
 
+    deformation = "elongation"
     family: Literal["shell-reinforced-linear"] = Field(description="which geometry this is")
     slit_number: Count = Field(13, le=200, description="of full width; half ones at both ends")
     slit_width: Length = Field(0.0005, gt=0, description="the paper's cut spacing")

@@ -18,6 +18,7 @@ from rig.board.truth import truth_path
 from rig.board.virtual import VirtualBench
 from rig.errors import RigError
 from rig.experiment.bench import Bench
+from rig.experiment.deformation import live_meter
 from rig.experiment.errors import AbortedError
 from rig.experiment.plan import Plan, check_pressure
 from rig.experiment.prepare import make_safe, take_over, write_parameters
@@ -30,13 +31,13 @@ from rig.mechanics.job import Job
 from rig.mechanics.store import FolderStore
 from rig.record.documents import PartDocument, PointDocument, PointKey
 from rig.spec.free_path import first_free
+from rig.spec.measurand import MEASURANDS, Measurand
 from rig.spec.workspace import Setup, Workspace
 from rig.studio.errors import StudioError
 from rig.studio.look import NOTHING, Look, Lookout
 from rig.studio.scope import Scope
 from rig.studio.seat import PATIENCE_S, Seat
 from rig.studio.watched import Glances, Pace, WatchedBench
-from rig.vision.measure import AngleMeter
 
 Ask = Literal["take", "give", "connect", "disconnect", "order", "answer"]
 Opcode = Literal["home", "zero_pressure", "tare", "jog", "set_pressure", "hold", "clear_fault"]
@@ -119,6 +120,12 @@ class Desk:
         if setup is None or reading.load_cell_counts is None or "tared" not in reading.flags:
             return None
         return setup.calibrations.load_cell.grams(reading.load_cell_counts)
+
+    @property
+    def measurand(self) -> Measurand:
+        """What the camera measures."""
+        setup = self._setup
+        return MEASURANDS["bending"] if setup is None else setup.actuator.measurand
 
     # --- asked by browsers -----------------------------------------------------------------
 
@@ -246,8 +253,7 @@ class Desk:
     # --- the thread of the bench -----------------------------------------------------------
 
     def _serve(self, choice: Choice, request: RunRequest) -> None:
-        calibrations = request.setup.calibrations
-        self._lookout = Lookout(AngleMeter(calibrations.camera, calibrations.ruler), self._looked)
+        self._lookout = Lookout(live_meter(request.setup), self._looked)
         try:
             wanted: _Take | None = None
             while not self._leave.is_set():

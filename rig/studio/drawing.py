@@ -45,8 +45,7 @@ def profile_svg(profile: SideProfile, box: Box, title: str) -> str:
     painted = "".join(
         (
             _polygon(profile.connector, "rigid"),
-            _polygon(profile.bottom_layer, "soft"),
-            _polygon(profile.bellow, "soft"),
+            *(_polygon(outline, "soft") for outline in profile.soft),
             _polygon(profile.end_cap, "rigid"),
         )
     )
@@ -55,7 +54,7 @@ def profile_svg(profile: SideProfile, box: Box, title: str) -> str:
 
 def profile_shapes(profile: SideProfile) -> list[Array]:
     """All outlines of a side view."""
-    return [profile.connector, profile.bellow, profile.bottom_layer, profile.end_cap]
+    return [profile.connector, *profile.soft, profile.end_cap]
 
 
 def _polygon(points: Array, paint: str) -> str:

@@ -1,4 +1,4 @@
-"""What the camera says in the units people read: the angle in a picture."""
+"""What the camera says in the units people read: the deformation in a picture."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import cv2
 
+from rig.experiment.deformation import DeformationMeter
 from rig.vision.errors import VisionError
-from rig.vision.measure import AngleMeter
-from rig.vision.overlay import COVERAGE_FACTOR, draw_overlay
+from rig.vision.overlay import COVERAGE_FACTOR
 from rig.vision.segment import decoded
 
 JPEG_QUALITY = 80
@@ -21,10 +21,11 @@ class Look:
     """One picture with what was measured drawn on it."""
 
     jpeg: bytes
-    angle_deg: float | None = None
-    u95_deg: float | None = None
+    value: float | None = None
+    """In deg of an actuator that bends, in mm of one that lengthens."""
+    u95: float | None = None
     reason: str = ""
-    """Why there is no angle."""
+    """Why there is no value."""
     time_s: float = 0.0
     """Bench time of the picture."""
 
@@ -33,20 +34,18 @@ NOTHING = Look(b"")
 """No picture yet."""
 
 
-def looked_at(jpeg: bytes, meter: AngleMeter) -> Look:
+def looked_at(jpeg: bytes, meter: DeformationMeter) -> Look:
     """Measure the picture; one that cannot be read or measured is given back as it came."""
     image = decoded(jpeg)
     if image is None:
         return Look(jpeg, reason="the frame is no readable picture")
     try:
-        found = meter.measure(image)
+        sight, drawn = meter.drawn(image)
     except VisionError as error:
         return Look(jpeg, reason=str(error))
-    _, coded = cv2.imencode(
-        ".jpg", draw_overlay(image, found), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
-    )
-    u95 = None if found.angle_deg is None else COVERAGE_FACTOR * found.u_deg
-    return Look(coded.tobytes(), found.angle_deg, u95, found.reason)
+    _, coded = cv2.imencode(".jpg", drawn, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    u95 = None if sight.value is None else COVERAGE_FACTOR * sight.u
+    return Look(coded.tobytes(), sight.value, u95, sight.reason)
 
 
 class Lookout:
@@ -55,7 +54,7 @@ class Lookout:
     Pictures that come while one is being measured replace each other.
     """
 
-    def __init__(self, meter: AngleMeter, tell: Callable[[Look], None]) -> None:
+    def __init__(self, meter: DeformationMeter, tell: Callable[[Look], None]) -> None:
         self._meter = meter
         self._tell = tell
         self._changed = threading.Condition()

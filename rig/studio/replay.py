@@ -1,7 +1,7 @@
 """A recorded run to be looked at at any of its times: pictures, traces, and what was measured.
 
-Everything comes from the log, through the calibrations it carries: angles by vision, forces by the
-load cell.
+Everything comes from the log, through the calibrations it carries: deformations by
+vision, forces by the load cell.
 """
 
 from __future__ import annotations
@@ -15,16 +15,17 @@ from pathlib import Path
 
 import numpy as np
 
+from rig.experiment.deformation import recorded_meter
+from rig.experiment.errors import ExperimentError
 from rig.record.channels import LOG_FILE
 from rig.record.documents import PointDocument
 from rig.record.reader import CameraImage, RunReader
 from rig.report.data import Trace, load_run
 from rig.spec.calibration import LoadCellCalibration
-from rig.spec.workspace import BenchCalibrations
+from rig.spec.measurand import Measurand
 from rig.studio.curves import Array
 from rig.studio.errors import StudioError
 from rig.studio.look import looked_at
-from rig.vision.measure import AngleMeter
 
 LARGEST_LOG = 256 << 20
 """Bytes of a log that is read as a whole."""
@@ -52,7 +53,8 @@ class Moment:
     time_s: float
     pressure_kpa: float | None
     setpoint_kpa: float | None
-    angle_deg: float | None
+    deformation: float | None
+    measurand: Measurand
     force_g: float | None
     frame: int | None
     """Index of the picture that was the last one then."""
@@ -67,8 +69,9 @@ class Moment:
             said.append(f"{self.pressure_kpa:z.2f} kPa")
         if self.force_g is not None:
             said.append(f"{self.force_g:z.2f} g")
-        if self.angle_deg is not None:
-            said.append(f"last angle {self.angle_deg:z.1f} deg")
+        if self.deformation is not None:
+            quantity, unit = self.measurand.quantity, self.measurand.unit
+            said.append(f"last {quantity} {self.deformation:z.1f} {unit}")
         if self.frame_s is not None:
             said.append(f"picture of {self.frame_s:.1f} s")
         return ", ".join((*said, self.doing) if self.doing else said)
@@ -83,10 +86,12 @@ class Replay:
         self.name = folder.name
         self.trace: Trace = data.trace
         self.images: tuple[CameraImage, ...] = tuple(reader.images())
-        self.angle = _angles(reader, self.images)
+        self.measurand = data.setup.actuator.measurand
+        self.deformation = _deformations(reader, self.images)
         self.force = _forces(reader, data.setup.calibrations.load_cell)
         self._points = data.points
-        self._calibrations: BenchCalibrations = data.setup.calibrations
+        self._setup = data.setup
+        self._rest = reader.rest_image()
         self._image_s = [image.time_s for image in self.images]
 
     @property
@@ -103,7 +108,8 @@ class Replay:
             time_s=time_s,
             pressure_kpa=Series(trace.time_s, trace.pressure_kpa).before(time_s),
             setpoint_kpa=Series(trace.time_s, trace.setpoint_kpa).before(time_s),
-            angle_deg=self.angle.before(time_s),
+            deformation=self.deformation.before(time_s),
+            measurand=self.measurand,
             force_g=self.force.before(time_s),
             frame=frame if frame >= 0 else None,
             frame_s=self._image_s[frame] if frame >= 0 else None,
@@ -124,23 +130,26 @@ class Replay:
         jpeg = self.images[frame].jpeg
         if not overlay:
             return jpeg
-        meter = AngleMeter(self._calibrations.camera, self._calibrations.ruler)
+        try:
+            meter = recorded_meter(self._setup, self._rest)
+        except ExperimentError as error:
+            raise StudioError(str(error)) from None
         return looked_at(jpeg, meter).jpeg
 
 
-def _angles(reader: RunReader, images: Sequence[CameraImage]) -> Series:
+def _deformations(reader: RunReader, images: Sequence[CameraImage]) -> Series:
     """Accepted readings of points and of trials, at the times of their pictures."""
     taken_s = {(image.key, image.frame): image.time_s for image in images}
     found = [
-        (taken_s[r.key, r.frame], r.angle_deg)
-        for r in reader.angle_readings()
-        if r.accepted and r.angle_deg is not None and (r.key, r.frame) in taken_s
+        (taken_s[r.key, r.frame], r.value)
+        for r in reader.deformation_readings()
+        if r.accepted and r.value is not None and (r.key, r.frame) in taken_s
     ]
     began_s = {part.key: part.from_s for part in reader.parts()}
     found += [
-        (began_s[look.key] + look.time_s, look.angle_deg)
+        (began_s[look.key] + look.time_s, look.value)
         for look in reader.looks()
-        if look.accepted and look.angle_deg is not None and look.key in began_s
+        if look.accepted and look.value is not None and look.key in began_s
     ]
     table = np.array(sorted(found), dtype=np.float64).reshape(-1, 2)
     return Series(table[:, 0], table[:, 1])

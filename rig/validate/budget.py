@@ -12,6 +12,8 @@ are the derivatives (JCGM 100:2008, 5.1.3). Units are those of the lab: kPa, g, 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 
 from rig.spec.calibration import LoadCellCalibration, TransducerCalibration
 from rig.validate.uncertainty import Component
@@ -27,6 +29,13 @@ def readings(sd: float, count: int, unit: str) -> Component:
     """
     dof = max(1, count - 1)
     return Component(READINGS, sd / math.sqrt(max(1, count)), dof, unit=unit, kind="A")
+
+
+def averaged(lines: Sequence[Component]) -> Component:
+    """One error common to several results, as it acts on their mean."""
+    u = math.sqrt(math.fsum(line.u**2 for line in lines) / len(lines))
+    sensitivity = math.fsum(line.sensitivity for line in lines) / len(lines)
+    return replace(lines[0], u=u, sensitivity=sensitivity, dof=min(line.dof for line in lines))
 
 
 def pressure_components(

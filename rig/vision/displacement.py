@@ -7,7 +7,7 @@ the middle, mapped through lens and ruler. A marker's own pose is never asked fo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from rig.spec.calibration import CameraCalibration, RulerCalibration
 from rig.vision.errors import UntrustedFrameError
 from rig.vision.lines import FloatArray
 from rig.vision.markers import both, everywhere, find_markers
+from rig.vision.measure import FrameGeometry, PartGeometry
 from rig.vision.motion import ConstantVelocity, require_later
 from rig.vision.parts import SMALL_RAD, SeenParts, sheared
 from rig.vision.plane import PicturePlane, rectify, require_picture
@@ -49,6 +50,46 @@ class DisplacementMeasurement:
     """Of its uncertainty, in mm; None when rejected."""
     accepted: bool
     reason: str
+    geometry: FrameGeometry = field(default_factory=FrameGeometry)
+    """What was found, for overlays: markers and ruler."""
+
+
+@dataclass(frozen=True)
+class DisplacementMeter:
+    """Measures displacements since a frame at rest, in any number of frames, without memory.
+
+    The frame at rest gives the plane: camera and ruler must not move after it.
+    """
+
+    rest: Rest
+    camera: CameraCalibration | None
+
+    @classmethod
+    def at_rest(
+        cls,
+        image_bgr: Image,
+        camera: CameraCalibration | None,
+        ruler: RulerCalibration,
+        fixed: int = 0,
+        moving: int = 1,
+    ) -> DisplacementMeter:
+        """The meter whose zero is what this frame shows of the markers (names in 4X4_50).
+
+        Raises UntrustedFrameError where they or the ruler are not seen, VisionError for what is no
+        picture of the camera.
+        """
+        require_picture(image_bgr, camera)
+        corners = both(find_markers(image_bgr, *everywhere(image_bgr)), (fixed, moving))
+        return cls(Rest.seen(image_bgr, corners, (fixed, moving), camera, ruler), camera)
+
+    def measure(self, image_bgr: Image) -> DisplacementMeasurement:
+        """Displacement in `image_bgr` (h, w, 3) uint8; raises VisionError as `at_rest`."""
+        require_picture(image_bgr, self.camera)
+        try:
+            found = find_markers(image_bgr, *everywhere(image_bgr))
+            return self.rest.measured(both(found, self.rest.names))
+        except UntrustedFrameError as why:
+            return DisplacementMeasurement(None, None, False, str(why))
 
 
 class DisplacementTracker:
@@ -69,7 +110,7 @@ class DisplacementTracker:
         self._camera = camera
         self._ruler = ruler
         self._names = (fixed, moving)
-        self._zero: _Zero | None = None
+        self._zero: Rest | None = None
         self._track: _Track | None = None
 
     def measure(self, image_bgr: Image, time_s: float) -> DisplacementMeasurement:
@@ -91,17 +132,12 @@ class DisplacementTracker:
             track = None
         expected = None if track is None else track.predicted(time_s)
         corners = self._corners(image, expected)
-        fixed, moving = (_crossing(four) for four in corners)
+        moving = _crossing(corners[1])
         if expected is not None:
             _require_near(moving, expected)
         if self._zero is None:
-            levels = pyramid(image)
-            plane = rectify(self._camera, self._ruler, find_ruler(levels, self._ruler.marks))
-            places = np.stack([fixed, moving])
-            start, end = plane.places_mm(places)
-            self._zero = _Zero(plane, places, end - start, _misfit(plane, corners))
-        if np.hypot(*(fixed - self._zero.places_px[0])) > FIXED_MOVE_PX:
-            raise UntrustedFrameError("the marker at the fixed end has moved: so has the camera")
+            self._zero = Rest.seen(image, corners, self._names, self._camera, self._ruler)
+        measurement = self._zero.measured(corners)
         side = float(np.hypot(*(corners[1][1] - corners[1][0])))
         state = (
             ConstantVelocity.begun(moving, np.full(2, PLACE_U_PX), np.full(2, START_RATE_PX_S))
@@ -109,8 +145,7 @@ class DisplacementTracker:
             else expected.updated(moving, np.full(2, PLACE_U_PX))
         )
         self._track = _Track(state, time_s, side)
-        displacement, parts = self._zero.displacement(np.stack([fixed, moving]), corners)
-        return DisplacementMeasurement(displacement, parts, True, "")
+        return measurement
 
     def _corners(self, image: Image, expected: ConstantVelocity | None) -> list[FloatArray]:
         """Corners (4, 2) px of both markers: sought where they are expected, then everywhere."""
@@ -127,15 +162,48 @@ class DisplacementTracker:
 
 
 @dataclass(frozen=True)
-class _Zero:
-    """What the first frame gives."""
+class Rest:
+    """What the frame at rest gives."""
 
+    names: tuple[int, int]
+    """Of the fixed and the moving marker."""
     plane: PicturePlane
-    places_px: FloatArray  # (2, 2) of the fixed and the moving marker
-    apart_mm: FloatArray  # (2,) from the fixed to the moving marker
-    misfit: float  # of their corners, mm2
+    places_px: FloatArray
+    """(2, 2) of both."""
+    misfit: float
+    """Of their corners, mm2."""
+    marks_px: FloatArray
+    """Of the ruler, (n, 2)."""
 
-    def displacement(
+    @classmethod
+    def seen(
+        cls,
+        image: Image,
+        corners: Sequence[FloatArray],
+        names: tuple[int, int],
+        camera: CameraCalibration | None,
+        ruler: RulerCalibration,
+    ) -> Rest:
+        """Of markers with these `corners` (4, 2) px; raises UntrustedFrameError without a ruler."""
+        marks = find_ruler(pyramid(image), ruler.marks)
+        plane = rectify(camera, ruler, marks)
+        places = np.stack([_crossing(four) for four in corners])
+        return cls(names, plane, places, _misfit(plane, corners), marks.pixels)
+
+    def measured(self, corners: Sequence[FloatArray]) -> DisplacementMeasurement:
+        """The displacement of markers with these corners, (4, 2) px each.
+
+        Raises UntrustedFrameError if the fixed one has moved.
+        """
+        places = np.stack([_crossing(four) for four in corners])
+        if np.hypot(*(places[0] - self.places_px[0])) > FIXED_MOVE_PX:
+            raise UntrustedFrameError("the marker at the fixed end has moved: so has the camera")
+        displacement, parts = self._displacement(places, corners)
+        fixed, moving = (PartGeometry(four, (four[:2], four[3:1:-1])) for four in corners)
+        geometry = FrameGeometry(fixed, moving, (), self.marks_px)
+        return DisplacementMeasurement(displacement, parts, True, "", geometry)
+
+    def _displacement(
         self, places_px: FloatArray, corners: Sequence[FloatArray]
     ) -> tuple[float, SeenParts]:
         """Displacement in mm and what the picture tells of its uncertainty.

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from rig.vision.lines import FloatArray
-from rig.vision.measure import AngleMeasurement
+from rig.vision.measure import AngleMeasurement, FrameGeometry
 from rig.vision.segment import Image
 
 CONNECTOR = (255, 220, 60)  # BGR; cyan and orange differ for every kind of colour vision
@@ -26,17 +26,10 @@ def draw_overlay(image_bgr: Image, measurement: AngleMeasurement) -> Image:
 
     A rejected frame shows the outlines of what was found and the reason.
     """
-    canvas: Image = image_bgr.copy()
-    size = max(canvas.shape[:2])
-    line = max(1, round(size / 640))
     geometry = measurement.geometry
-    for mark in geometry.ruler_marks:
-        _circle(canvas, mark, 0.011 * size, MARKS, line)
     if measurement.angle_deg is None or geometry.connector is None or geometry.cap is None:
-        for outline in geometry.candidates:
-            _polyline(canvas, outline, REJECTED, line, closed=True)
-        _panel(canvas, f"rejected: {measurement.reason}", REJECTED)
-        return canvas
+        return draw_rejected(image_bgr, measurement.reason, geometry)
+    canvas, line = _with_marks(image_bgr, geometry)
     for part, colour in ((geometry.connector, CONNECTOR), (geometry.cap, CAP)):
         for edge in part.edges:
             _polyline(canvas, edge, colour, line + 1)
@@ -44,6 +37,39 @@ def draw_overlay(image_bgr: Image, measurement: AngleMeasurement) -> Image:
     u95 = COVERAGE_FACTOR * measurement.u_deg
     _panel(canvas, f"{measurement.angle_deg:.2f} +- {u95:.2f} deg", ARC)
     return canvas
+
+
+def draw_displacement(image_bgr: Image, geometry: FrameGeometry, words: str) -> Image:
+    """Copy of `image_bgr` (h, w, 3) with both markers, the way between them and the result."""
+    canvas, line = _with_marks(image_bgr, geometry)
+    middles = []
+    for part, colour in ((geometry.connector, CONNECTOR), (geometry.cap, CAP)):
+        assert part is not None  # there is a result
+        _polyline(canvas, part.outline, colour, line + 1, closed=True)
+        middles.append(part.outline.mean(axis=0))
+    _polyline(canvas, np.array(middles), ARC, line)
+    _panel(canvas, words, ARC)
+    return canvas
+
+
+def draw_rejected(image_bgr: Image, reason: str, geometry: FrameGeometry | None = None) -> Image:
+    """Copy of a rejected frame with the outlines of what was found and the reason."""
+    found = geometry or FrameGeometry()
+    canvas, line = _with_marks(image_bgr, found)
+    for outline in found.candidates:
+        _polyline(canvas, outline, REJECTED, line, closed=True)
+    _panel(canvas, f"rejected: {reason}", REJECTED)
+    return canvas
+
+
+def _with_marks(image_bgr: Image, geometry: FrameGeometry) -> tuple[Image, int]:
+    """A copy with the marks of the ruler, and how wide lines are in px."""
+    canvas: Image = image_bgr.copy()
+    size = max(canvas.shape[:2])
+    line = max(1, round(size / 640))
+    for mark in geometry.ruler_marks:
+        _circle(canvas, mark, 0.011 * size, MARKS, line)
+    return canvas, line
 
 
 def _arc(

@@ -47,7 +47,7 @@ def main() -> None:
     print(head.format("elements", "moved mm", "ours N", "ccx N", "off %", "plastic %"))
     coarse, fine = JointResolution(wall=2, fifth=2), JointResolution(wall=4, fifth=4)
     for resolution in (coarse, fine):
-        actuator = joint_model(geometry, material, resolution=resolution, moved=True)
+        actuator = joint_model(geometry, material, resolution=resolution, moved=1.0)
         way = MOVED * np.arange(1, STEPS + 1) / STEPS
         result = follow(actuator.model, [Point(0.0, motion=u) for u in way])
         assert result.failure is None, result.failure

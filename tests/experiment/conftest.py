@@ -12,12 +12,14 @@ import pytest
 from rig.board.truth import TruthSample, read_truth
 from rig.board.virtual import VirtualBench
 from rig.experiment.bench import Nobody, Observer
+from rig.experiment.errors import AbortedError
 from rig.experiment.plan import make_plan
 from rig.experiment.program import plan_trials
 from rig.experiment.recorded import RunOutcome
 from rig.experiment.run import new_run, resume_run
 from rig.experiment.setup import RunRequest
-from rig.mechanics.profile import cavity_volume
+from rig.mechanics.outline import body_of
+from rig.record.documents import PointDocument
 from rig.record.reader import RunReader
 from rig.spec.protocol import ProtocolSpec
 from rig.spec.workspace import Workspace
@@ -46,16 +48,19 @@ SHORT: dict[str, Any] = {
 
 
 def make_request(
-    protocol: dict[str, object] = SHORT, seed: int = 1, bench: str = "virtual-beam"
+    protocol: dict[str, object] = SHORT,
+    seed: int = 1,
+    bench: str = "virtual-beam",
+    actuator: str = BEAM_ACTUATOR,
 ) -> RunRequest:
-    setup = Workspace(ROOT).setup(BEAM_ACTUATOR, bench)
+    setup = Workspace(ROOT).setup(actuator, bench)
     # the files behind a run are its attachments: a replaced protocol must be there as well
     spec = ProtocolSpec.model_validate(protocol)
     source = replace(
         setup.sources["protocol"], spec=spec, text=spec.model_dump_json(exclude_none=True)
     )
     setup = replace(setup, protocol=spec, sources={**setup.sources, "protocol": source})
-    cavity = float(cavity_volume(setup.actuator.geometry, 0.0))
+    cavity = body_of(setup.actuator.geometry).cavity_volume
     return RunRequest(
         setup=setup,
         plan=make_plan(spec, setup.actuator, setup.bench),
@@ -77,6 +82,20 @@ class VirtualRun:
     def truth(self, segment: int = 1) -> list[TruthSample]:
         name = "truth.mcap" if segment == 1 else f"truth-{segment}.mcap"
         return read_truth(self.folder / name)
+
+
+class StopsAfter(Nobody):
+    """Asks to stop when so many points are done, like a person who presses Ctrl-C."""
+
+    def __init__(self, points: int) -> None:
+        self._left = points
+
+    def point_done(self, point: PointDocument) -> None:
+        self._left -= 1
+
+    def check(self) -> None:
+        if self._left <= 0:
+            raise AbortedError("stopped on request.")
 
 
 def take(
@@ -109,7 +128,10 @@ def take_rest(folder: Path, request: RunRequest) -> VirtualRun:
     )
     try:
         done, done_parts = [p.key for p in points], [p.key for p in parts]
-        outcome = resume_run(folder, bench, request, Nobody(), done, done_parts=done_parts)
+        rest = RunReader(folder).rest_image()
+        outcome = resume_run(
+            folder, bench, request, Nobody(), done, done_parts=done_parts, rest_jpeg=rest
+        )
     finally:
         bench.close()
     return VirtualRun(folder, outcome)

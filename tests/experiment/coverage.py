@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from scipy.stats import binom
 
 from rig.board.virtual_calibration import VirtualCalibrationBench
-from rig.experiment.evaluate import Visit, angle_point, force_point
-from rig.experiment.measure import read_angle
+from rig.experiment.deformation import BendingMeter
+from rig.experiment.evaluate import Visit, component_of, deformation_point, force_point
+from rig.experiment.measure import read_deformation
 from rig.experiment.prepare import (
     bench_parameters,
     leave_home,
@@ -29,7 +30,6 @@ from rig.link.client import Message, RigLink
 from rig.link.schema import load_schema
 from rig.plant.camera import VirtualCamera
 from rig.record.documents import PointKey
-from rig.report.levels import component_of
 from rig.spec.bench import BenchSpec
 from rig.spec.protocol import Settling
 from rig.spec.quantity import STANDARD_GRAVITY
@@ -172,13 +172,13 @@ def _measured_angle(seed: int) -> tuple[Estimate, float] | None:
         BENCH.camera.jpeg_quality,
         np.random.default_rng((seed, 4)),
     )
-    meter = AngleMeter(CALIBRATIONS.camera, CALIBRATIONS.ruler)
+    meter = BendingMeter(AngleMeter(CALIBRATIONS.camera, CALIBRATIONS.ruler))
     frames = [
-        read_angle(meter, camera.grab(np.radians(angle_deg), 0.1 * frame), KEY, frame)
+        read_deformation(meter, camera.grab(np.radians(angle_deg), 0.1 * frame), KEY, frame)
         for frame in range(FRAMES)
     ]
     visit = Visit(KEY, 0.0, 0.0, 0.0, 0.0, np.zeros(3), CALIBRATIONS.transducer)
-    point = angle_point(visit, frames, CALIBRATIONS.camera)
+    point = deformation_point(visit, frames, "deg")
     if point.value is None:
         return None
     return combine(point.value, [component_of(line) for line in point.value_parts]), angle_deg

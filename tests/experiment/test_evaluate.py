@@ -7,15 +7,22 @@ from datetime import date
 import numpy as np
 import pytest
 
-from rig.experiment.evaluate import TARE_WORDS, CellReading, Visit, angle_point, force_point
-from rig.record.documents import AngleReading, PointKey
+from rig.experiment.evaluate import (
+    TARE_WORDS,
+    CellReading,
+    Visit,
+    budget_lines,
+    deformation_point,
+    force_point,
+)
+from rig.record.documents import DeformationReading, PointKey
 from rig.spec.calibration import (
-    CameraCalibration,
     LoadCellCalibration,
     Provenance,
     TransducerCalibration,
 )
 from rig.spec.workspace import library_root
+from rig.validate.uncertainty import Component
 
 KEY = PointKey(experiment="deformation", repeat=1, direction="up", target_kpa=3.0)
 PROVENANCE = Provenance(date=date(2026, 1, 1), method="test", instrument="none")
@@ -30,20 +37,6 @@ TRANSDUCER = TransducerCalibration.model_validate(
         "bow": "0.04 kPa",
         "linearity_u": "0.01 kPa",
         "zero_u": "0.005 kPa",
-        "provenance": PROVENANCE,
-    }
-)
-CAMERA = CameraCalibration.model_validate(
-    {
-        "kind": "calibration",
-        "instrument": "camera",
-        "width": 1280,
-        "height": 720,
-        "focal_x": 2240,
-        "focal_y": 2240,
-        "centre_x": 639.5,
-        "centre_y": 359.5,
-        "angle_u_deg": 0.02,
         "provenance": PROVENANCE,
     }
 )
@@ -64,12 +57,14 @@ CELL = LoadCellCalibration.model_validate(
 )
 
 
-def frame(angle: float | None, u: float = 0.03, reason: str = "") -> AngleReading:
-    return AngleReading(
+def frame(angle: float | None, u: float = 0.03, reason: str = "") -> DeformationReading:
+    return DeformationReading(
         key=KEY,
         frame=0,
-        angle_deg=angle,
-        u_deg=u,
+        value=angle,
+        unit="deg",
+        u=u,
+        parts=budget_lines([Component("edges", u, unit="deg")]) if angle is not None else (),
         quality=1.0,
         accepted=not reason,
         reason=reason,
@@ -78,7 +73,7 @@ def frame(angle: float | None, u: float = 0.03, reason: str = "") -> AngleReadin
 
 def test_an_angle_is_the_mean_of_the_accepted_frames() -> None:
     frames = [frame(30.0), frame(30.2), frame(90.0, reason="blurred")]
-    point = angle_point(VISIT, frames, CAMERA)
+    point = deformation_point(VISIT, frames, "deg")
     assert point.value == pytest.approx(30.1)
     assert point.readings == 2
     assert point.rejected == ("blurred",)
@@ -87,7 +82,7 @@ def test_an_angle_is_the_mean_of_the_accepted_frames() -> None:
 
 
 def test_a_point_without_a_good_frame_has_no_value() -> None:
-    point = angle_point(VISIT, [frame(None, reason="no end cap")], CAMERA)
+    point = deformation_point(VISIT, [frame(None, reason="no end cap")], "deg")
     assert point.value is None
     assert point.readings == 0
 
@@ -107,7 +102,7 @@ def test_a_force_is_in_grams_with_calibration_in_its_uncertainty() -> None:
 
 
 def test_a_pressure_is_corrected_for_the_bow_and_carries_its_own_budget() -> None:
-    point = angle_point(VISIT, [frame(30.0)], CAMERA)
+    point = deformation_point(VISIT, [frame(30.0)], "deg")
     # 3 kPa is a quarter of the span
     assert point.pressure_kpa == pytest.approx(3.0 + 0.03)
     share = 4 * (3.03 / 12) * (1 - 3.03 / 12)
@@ -116,12 +111,11 @@ def test_a_pressure_is_corrected_for_the_bow_and_carries_its_own_budget() -> Non
     assert point.pressure_u_kpa == pytest.approx(np.linalg.norm(parts))
 
 
-def test_what_vision_is_unsure_of_is_parted_into_lens_and_the_rest() -> None:
-    point = angle_point(VISIT, [frame(30.0)] * 3, CAMERA)
+def test_what_vision_is_unsure_of_is_not_averaged_away() -> None:
+    """It is one error for all frames of a still scene, as large as on the mean of its squares."""
+    point = deformation_point(VISIT, [frame(30.0, 0.01), frame(30.0, 0.07)], "deg")
     u = {p.name: p.u for p in point.value_parts}
-    assert u == pytest.approx(
-        {"readings": 0.0, "edges and ruler": np.sqrt(0.03**2 - 0.02**2), "lens": 0.02}
-    )
+    assert u == pytest.approx({"readings": 0.0, "edges": np.sqrt((0.01**2 + 0.07**2) / 2)})
 
 
 def test_a_tare_is_the_mean_of_as_many_words_as_the_firmware_takes() -> None:

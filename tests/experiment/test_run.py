@@ -16,7 +16,6 @@ import pytest
 
 from rig.board.virtual import VirtualBench
 from rig.experiment.bench import Nobody
-from rig.experiment.errors import AbortedError
 from rig.experiment.prepare import board_parameters
 from rig.experiment.recheck import LOOKS
 from rig.experiment.replay import ReplayedRun
@@ -32,7 +31,7 @@ from rig.record.reader import RunReader
 from rig.record.writer import RunWriter
 from tests.evidence import Evidence
 
-from .conftest import ROOT, SHORT, VirtualRun, make_request, take, take_rest
+from .conftest import ROOT, SHORT, StopsAfter, VirtualRun, make_request, take, take_rest
 from .truth import errors
 
 ANGLE_TARGET_DEG = 0.2
@@ -275,26 +274,12 @@ def test_another_seed_gives_other_points(short_run: VirtualRun, tmp_path: Path) 
 def test_a_replay_computes_exactly_the_recorded_points(short_run: VirtualRun) -> None:
     replayed = ReplayedRun(short_run.folder)
     assert replayed.points() == short_run.reader.points()
-    assert replayed.angle_readings() == short_run.reader.angle_readings()
+    assert replayed.deformation_readings() == short_run.reader.deformation_readings()
 
 
 def test_the_bench_is_vented_at_the_end(short_run: VirtualRun) -> None:
     assert abs(short_run.truth()[-1].pressure_kpa) < 0.01
     assert short_run.reader.telemetry("HEARTBEAT")["valve_open"][-1] == 1
-
-
-class StopsAfter(Nobody):
-    """Asks to stop when so many points are done, like a person who presses Ctrl-C."""
-
-    def __init__(self, points: int) -> None:
-        self._left = points
-
-    def point_done(self, point: PointDocument) -> None:
-        self._left -= 1
-
-    def check(self) -> None:
-        if self._left <= 0:
-            raise AbortedError("stopped on request.")
 
 
 def test_what_a_run_was_cautioned_of_is_a_warning_in_its_log(tmp_path: Path) -> None:

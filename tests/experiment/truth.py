@@ -32,7 +32,7 @@ def errors(
 ) -> Errors:
     """Errors of an experiment's points against the truth averaged over each measurement."""
     time_s = np.array([t.time_s for t in truth])
-    names = {"deformation": "angle_deg", "blocked_force": "force_g"}
+    names = {"deformation": "deformation", "blocked_force": "force_g"}
     true_value = np.array([getattr(t, names[experiment]) for t in truth])
     true_pressure = np.array([t.pressure_kpa for t in truth])
     rows = []

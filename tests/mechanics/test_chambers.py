@@ -12,12 +12,10 @@ from rig.mechanics.cad.facets import triangulate
 from rig.mechanics.cad.parts import parts_of
 from rig.mechanics.cad.stl import volume
 from rig.mechanics.chambers import ChamberRow
-from rig.mechanics.errors import MechanicsError
 from rig.mechanics.fe import PressureSurface, discretise
 from rig.mechanics.mesh.chamber_row import RowResolution, mesh_chamber_row
 from rig.mechanics.mesh.measure import solid_volume
-from rig.mechanics.outline import PLATE_THICKNESS, bending_shape, side_profile
-from rig.spec.actuator import BellowAxisymmetricGeometry
+from rig.mechanics.outline import PLATE_THICKNESS, body_of, side_profile
 from rig.spec.chambers import (
     BellowRectangularGeometry,
     MultiChamberBendingGeometry,
@@ -143,15 +141,7 @@ def test_the_straight_outline_has_the_area_of_the_side(geometry):
     assert shoelace(shown.bellow) + shoelace(shown.bottom_layer) == pytest.approx(side, rel=1e-9)
     floor = 0.75e-3 if geometry is BLOCK else 1e-3
     assert shoelace(shown.bottom_layer) == pytest.approx(floor * row.end, rel=1e-9)
-    assert bending_shape(geometry) == row
-
-
-def test_what_does_not_bend_has_no_place_on_the_bench():
-    for geometry in (LINEAR, BellowAxisymmetricGeometry(family="bellow-axisymmetric")):
-        with pytest.raises(MechanicsError, match="do not bend"):
-            side_profile(geometry, 0.0)
-        with pytest.raises(MechanicsError, match="do not bend"):
-            bending_shape(geometry)
+    assert body_of(geometry) == row
 
 
 @pytest.mark.parametrize(

@@ -252,7 +252,8 @@ def test_rows_of_chambers_have_their_planes_materials_and_cap(name, planes, tmp_
 
 def test_a_model_that_decks_have_no_words_for_is_refused(agilus30, monkeypatch) -> None:
     actuator = load_actuator(Path("models/actuators/bellow-axisymmetric.yaml"))
-    wordless = Family(model=Meshing(lambda geometry, material: object()))
+    meshing = Meshing(*[lambda geometry, material: object()] * 2)
+    wordless = Family(meshing, meshing)
     monkeypatch.setitem(FAMILIES, "bellow-axisymmetric", wordless)
     with pytest.raises(DeckError, match="no input deck of the family 'bellow-axisymmetric'"):
         deck_model(actuator, agilus30)

@@ -101,7 +101,7 @@ def test_the_solid_for_cad_has_the_mesh_s_volume_but_for_its_inlet() -> None:
     (part,) = parts_of(geometry)
     surface = triangulate(part.solid, 5e-6)
     assert is_watertight(printable(surface))
-    inlet = np.pi * INLET_RADIUS**2 * shape.end
+    inlet = np.pi * INLET_RADIUS**2 * shape.end_thickness
     assert volume(surface) == pytest.approx(shape.soft_volume - inlet, rel=1e-2)
     assert surface[..., 2].max() == pytest.approx(shape.length + shape.end)
 

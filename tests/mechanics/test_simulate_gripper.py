@@ -84,7 +84,7 @@ def test_an_imprint_holds_the_same_summed_in_space_as_round_the_axis() -> None:
         x = np.zeros(d.size)
         x[d.dim - 1 : d.displacement_size : d.dim] = 10e-3
         state = replace(actuator.model.start(), x=x)
-        measured = actuator.measures(SimpleNamespace(state=state))  # type: ignore[arg-type]
+        measured = actuator.measures(SimpleNamespace(state=state, volume=0.0))  # type: ignore[arg-type]
         leaning.append(measured["force"] / measured["normal_force"] / (FINGERS * 0.13))
     assert leaning[1] == pytest.approx(leaning[0], rel=5e-3)
 

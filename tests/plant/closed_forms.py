@@ -254,7 +254,7 @@ def steady_flow(pressure: float, **changes: object) -> tuple[float, float]:
     """Flow between two vast volumes, and the density of the air in the tube."""
     vast = rigid()
     volume = np.full_like(vast.pressure, VAST)
-    tables = Tables(vast.pressure, vast.angle, vast.blocked_force, volume, volume)
+    tables = Tables(vast.pressure, vast.deformation, vast.blocked_force, volume, volume)
     plant = make(
         tables=tables,
         dead_volume=VAST,

@@ -23,7 +23,7 @@ DEAD_AND_TUBE = 1.5e-6 + 1.57e-6
 @dataclass(frozen=True)
 class Tables:
     pressure: NDArray[np.float64]
-    angle: NDArray[np.float64]
+    deformation: NDArray[np.float64]
     blocked_force: NDArray[np.float64]
     volume_free: NDArray[np.float64]
     volume_blocked: NDArray[np.float64]
@@ -34,7 +34,7 @@ def rigid() -> Tables:
     pressure = np.linspace(-2e3, 30e3, 200)
     return Tables(
         pressure=pressure,
-        angle=pressure * 1e-4,
+        deformation=pressure * 1e-4,
         blocked_force=pressure * 3e-5,
         volume_free=np.full_like(pressure, CAVITY),
         volume_blocked=np.full_like(pressure, CAVITY),

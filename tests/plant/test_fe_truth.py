@@ -79,18 +79,18 @@ def test_a_stiffer_print_is_the_same_as_less_load_times_the_stiffness(setup) -> 
     )
     scaled = finite_element_truth(setup.actuator, setup.material, 1.2, PRESSURE, Job())
     direct = finite_element_truth(setup.actuator, stiffer, 1.0, PRESSURE, Job())
-    for name in ("angle", "volume_free", "volume_blocked", "blocked_force"):
+    for name in ("deformation", "volume_free", "volume_blocked", "blocked_force"):
         # the rungs lie elsewhere, so that interpolation differs a little
         expected = getattr(direct, name)
         slack = 2e-3 * np.ptp(expected)
         np.testing.assert_allclose(getattr(scaled, name), expected, atol=slack, err_msg=name)
     soft = finite_element_truth(setup.actuator, setup.material, 1.0, PRESSURE, Job())
-    assert soft.angle[-1] - scaled.angle[-1] > 0.05 * soft.angle[-1]
+    assert soft.deformation[-1] - scaled.deformation[-1] > 0.05 * soft.deformation[-1]
 
 
 def test_beyond_the_limit_and_below_zero_the_tables_go_straight_on(setup) -> None:
     tables = finite_element_truth(setup.actuator, setup.material, 1.0, PRESSURE, Job())
-    for values in (tables.angle, tables.volume_free):
+    for values in (tables.deformation, tables.volume_free):
         below, above = values[PRESSURE < 0], values[setup.actuator.limits.pressure < PRESSURE]
         for part in (below, above):
             np.testing.assert_allclose(np.diff(part), np.diff(part)[0], rtol=1e-9)

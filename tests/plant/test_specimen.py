@@ -22,7 +22,7 @@ ACTUATORS = [
     for name in LIBRARY.names("actuator")
     if LIBRARY.actuator(name).geometry.family == "bellow-bending"
 ]
-TABLES = ("angle", "blocked_force", "volume_free", "volume_blocked")
+TABLES = ("deformation", "blocked_force", "volume_free", "volume_blocked")
 NOTHING = dict.fromkeys(
     (
         "wall_thickness",
@@ -99,7 +99,7 @@ def test_the_same_seed_prints_the_same_specimen(actuator, material, variation):
 
 
 def test_different_seeds_print_different_specimens(many):
-    angles = np.degrees([specimen.angle[-1] for specimen in many])
+    angles = np.degrees([specimen.deformation[-1] for specimen in many])
     assert len(np.unique(angles)) == len(many)
     assert np.ptp(angles) > 5.0
 
@@ -108,7 +108,7 @@ def test_no_specimen_is_the_model_under_validation(many, actuator, material):
     pressure = np.arange(0.0, 10.5e3, 1e3)
     nominal = predict(actuator, material, "beam", pressure).angle
     for specimen in many:
-        real = np.interp(pressure, specimen.pressure, specimen.angle)
+        real = np.interp(pressure, specimen.pressure, specimen.deformation)
         assert specimen.geometry != actuator.geometry
         assert specimen.young_modulus != material.young_modulus.value
         assert np.degrees(np.abs(real - nominal).max()) > 1.0
@@ -129,7 +129,9 @@ def test_without_stiffening_and_tolerances_only_the_offset_separates_it_from_the
     pressure = np.arange(0.0, 12.5e3, 1e3)
     nominal = predict(actuator, material, "beam", pressure)
     used = np.isin(specimen.pressure, pressure)
-    np.testing.assert_allclose(specimen.angle[used] - nominal.angle, np.deg2rad(3.0), atol=1e-12)
+    np.testing.assert_allclose(
+        specimen.deformation[used] - nominal.angle, np.deg2rad(3.0), atol=1e-12
+    )
     np.testing.assert_allclose(specimen.blocked_force[used], nominal.blocked_force, atol=1e-12)
 
 
@@ -142,7 +144,7 @@ def test_stiffening_takes_its_share_at_the_reference_and_nothing_below_zero():
 def test_angle_and_force_stiffen_with_pressure(actuator, material, variation):
     specimen = printed(actuator, material, variation)
     above = specimen.pressure >= 0
-    for table in ("angle", "blocked_force"):
+    for table in ("deformation", "blocked_force"):
         assert np.all(np.diff(getattr(specimen, table)[above], 2) < 0)
 
 
@@ -153,7 +155,7 @@ def test_a_thin_wall_and_a_soft_print_bend_more(actuator, material, variation, t
     )
     prints = [printed(actuator, material, only, seed) for seed in range(6)]
     stiff_first = sorted(prints, key=lambda s: (-s.geometry.wall_thickness, -s.young_modulus))
-    assert np.all(np.diff([s.angle[-1] for s in stiff_first]) > 0)
+    assert np.all(np.diff([s.deformation[-1] for s in stiff_first]) > 0)
 
 
 def test_tolerances_scatter_as_the_bench_says(many, actuator, material):
@@ -165,9 +167,9 @@ def test_tolerances_scatter_as_the_bench_says(many, actuator, material):
 
 def test_the_free_volume_is_the_cavity_at_the_angle(actuator, material, variation):
     specimen = printed(actuator, material, variation)
-    seen = specimen.angle < np.deg2rad(150)
+    seen = specimen.deformation < np.deg2rad(150)
     np.testing.assert_allclose(
-        specimen.volume_free[seen], cavity_volume(specimen.geometry, specimen.angle[seen])
+        specimen.volume_free[seen], cavity_volume(specimen.geometry, specimen.deformation[seen])
     )
 
 
@@ -185,7 +187,7 @@ def test_blocked_the_cavity_is_that_of_a_beam_held_at_its_tip(actuator, material
     by_moment, by_force = turn(np.ones_like(x)), turn(contact - x)
     force = np.trapezoid(by_moment, x) / np.trapezoid(by_force, x)
     held = 1 - force * by_force[-1] / by_moment[-1]
-    bend = specimen.angle - np.interp(0.0, specimen.pressure, specimen.angle)
+    bend = specimen.deformation - np.interp(0.0, specimen.pressure, specimen.deformation)
     np.testing.assert_allclose(
         specimen.volume_blocked, cavity_volume(specimen.geometry, held * bend), rtol=1e-5
     )
@@ -194,7 +196,7 @@ def test_blocked_the_cavity_is_that_of_a_beam_held_at_its_tip(actuator, material
 
 def test_the_tables_cannot_be_written_to(actuator, material, variation):
     with pytest.raises(ValueError, match="read-only"):
-        printed(actuator, material, variation).angle[0] = 0.0
+        printed(actuator, material, variation).deformation[0] = 0.0
 
 
 def test_a_wall_that_does_not_fit_is_refused_in_the_words_of_the_user(

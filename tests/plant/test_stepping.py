@@ -63,7 +63,7 @@ def test_ticks_are_steps_of_a_millisecond_with_sensors() -> None:
     for _ in range(400):
         stepped.do_step(stepped.truth().time, 1e-3, pulses=20)
     assert ticked.truth().gauge_pressure == stepped.truth().gauge_pressure > 1e3
-    assert ticked.truth().angle == stepped.truth().angle
+    assert ticked.truth().deformation == stepped.truth().deformation
 
 
 def test_a_tick_of_four_substeps_is_four_steps() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from rig.record.documents import (
-    AngleReading,
+    DeformationReading,
     PointDocument,
     PointKey,
     StartDocument,
@@ -69,16 +69,18 @@ def write_point(writer: RunWriter, number: int) -> None:
     for frame in range(2):
         time_s = document.measured_from_s + frame / 10
         writer.image(time_s, JPEG, document.key, frame)
-        reading = AngleReading(
+        reading = DeformationReading(
             key=document.key,
             frame=frame,
-            angle_deg=None if number == 2 else 5.0 * number,
-            u_deg=0.2,
+            value=None if number == 2 else 5.0 * number,
+            unit="deg",
+            u=0.2,
+            parts=(),
             quality=0.9,
             accepted=number != 2,
             reason="blurred" if number == 2 else "",
         )
-        writer.angle(reading, time_s)
+        writer.deformation(reading, time_s)
     writer.point(document, document.measured_to_s)
 
 

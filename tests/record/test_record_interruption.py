@@ -79,7 +79,7 @@ def read_everything(folder: Path) -> int:
     assert len(reader.telemetry("PRESSURE")["time_s"]) >= len(points) * ROWS_PER_POINT
     assert len(reader.can_frames().ids) >= len(points) * ROWS_PER_POINT
     assert len(list(reader.images())) >= 2 * len(points)
-    assert len(reader.angle_readings()) >= 2 * len(points)
+    assert len(reader.deformation_readings()) >= 2 * len(points)
     assert len(reader.events()) >= len(points)
     assert sum(reader.counts().values()) > 0 or not points
     return len(points)
@@ -128,7 +128,7 @@ def test_any_flipped_byte_is_noticed_or_harmless(
         assert reader.start() == START
         return
     assert reader.problem
-    for read in (reader.points, reader.angle_readings, reader.events, reader.can_frames):
+    for read in (reader.points, reader.deformation_readings, reader.events, reader.can_frames):
         with suppress(RecordError):
             read()
     with suppress(RecordError):

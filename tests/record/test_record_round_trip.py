@@ -27,7 +27,7 @@ from recorded_runs import (
 
 from rig.record.channels import document_schema
 from rig.record.documents import (
-    AngleReading,
+    DeformationReading,
     PointDocument,
     ResumeDocument,
     StartDocument,
@@ -48,8 +48,8 @@ def test_a_run_reads_back_as_it_was_written(tmp_path: Path) -> None:
     assert reader.resumes() == ()
     assert reader.attachments() == ATTACHMENTS
     assert reader.points() == tuple(point(number) for number in range(4))
-    assert [r.angle_deg for r in reader.angle_readings()] == [0, 0, 5, 5, None, None, 15, 15]
-    assert reader.angle_readings()[4].reason == "blurred"
+    assert [r.value for r in reader.deformation_readings()] == [0, 0, 5, 5, None, None, 15, 15]
+    assert reader.deformation_readings()[4].reason == "blurred"
 
 
 def test_images_carry_the_point_they_belong_to(tmp_path: Path) -> None:
@@ -130,7 +130,7 @@ def test_mcaps_own_reader_finds_schemas_channels_and_counts(tmp_path: Path) -> N
             "/points": 4,
             "/rig/heartbeat": 8,
             "/rig/pressure": 800,
-            "/vision/angle": 8,
+            "/vision/deformation": 8,
         }
         assert summary.statistics.message_count == sum(counts.values())
         schemas = {
@@ -188,7 +188,7 @@ def test_every_json_message_obeys_its_schema(tmp_path: Path) -> None:
     assert seen == 800 + 8 + 8 + 8 + 4
 
 
-@pytest.mark.parametrize("model", [PointDocument, AngleReading])
+@pytest.mark.parametrize("model", [PointDocument, DeformationReading])
 def test_document_schemas_are_flat(model: type) -> None:
     _, encoding, data = document_schema(model)
     text = data.decode()

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from rig.record.documents import (
-    AngleReading,
+    DeformationReading,
     Direction,
     ExitStatus,
     ExperimentName,
@@ -246,16 +246,18 @@ class _Teller:
             if not accepted:
                 rejected.append(reason)
             writer.image(time_s, picture, key, frame)
-            reading = AngleReading(
+            reading = DeformationReading(
                 key=key,
                 frame=frame,
-                angle_deg=value + self._rng.normal(0, 0.05) if accepted else None,
-                u_deg=0.05,
+                value=value + self._rng.normal(0, 0.05) if accepted else None,
+                unit="deg",
+                u=0.05,
+                parts=(),
                 quality=0.9 if accepted else 0.0,
                 accepted=accepted,
                 reason=reason,
             )
-            writer.angle(reading, time_s)
+            writer.deformation(reading, time_s)
         return tuple(rejected)
 
 

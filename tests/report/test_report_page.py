@@ -153,7 +153,7 @@ def test_the_same_log_gives_the_same_bytes_anywhere(built: Path, run_folder: Pat
     copy.mkdir()
     shutil.copy(run_folder / "run.mcap", copy)
     build_report(copy)
-    for name in ("report.html", "summary.json", "points.csv", "angles.csv", "pressure.csv"):
+    for name in ("report.html", "summary.json", "points.csv", "deformations.csv", "pressure.csv"):
         assert (copy / name).read_bytes() == (built / name).read_bytes(), name
 
 
@@ -171,10 +171,10 @@ def test_tables_have_units_and_every_row(built: Path, run_folder: Path) -> None:
     assert len(points) == len(reader.points())
     assert float(points[3]["value"]) == pytest.approx(reader.points()[3].value or 0, rel=1e-5)
     assert points[3]["unit"] == "deg"
-    with (built / "angles.csv").open() as stream:
+    with (built / "deformations.csv").open() as stream:
         angles = list(csv.DictReader(stream))
-    assert len(angles) == len(reader.angle_readings())
-    assert {"angle_deg", "u_deg", "target_kpa"} <= set(angles[0])
+    assert len(angles) == len(reader.deformation_readings())
+    assert {"value", "u", "unit", "target_kpa"} <= set(angles[0])
     with (built / "pressure.csv").open() as stream:
         trace = list(csv.DictReader(stream))
     telemetry = reader.telemetry("PRESSURE")

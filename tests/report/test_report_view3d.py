@@ -216,7 +216,8 @@ def test_a_model_in_the_plane_has_factors_but_nothing_to_turn(
     actuator = BendingTube()
     actuator.model = Model(d, [solid], supports=[base], surface=bore)
     actuator.measures = lambda solution: {"displacement": 0.0, "volume": solution.volume}
-    flat = Family(Meshing(lambda geometry, material: actuator))
+    meshing = Meshing(*[lambda geometry, material: actuator] * 2)
+    flat = Family(meshing, meshing)
     monkeypatch.setitem(FAMILIES, "bellow-bending", flat)
     found = strength_section(*specs, 1e3, Job())
     assert found.view is None

@@ -249,8 +249,8 @@ def test_a_run_that_is_looked_at_measures_the_same(
 def test_angle_and_force_come_from_picture_and_load_cell(desk: Desk) -> None:
     desk.watchers = 1
     connected(desk)
-    until(lambda: desk.look.angle_deg is not None)
-    at_rest = desk.look.angle_deg
+    until(lambda: desk.look.value is not None)
+    at_rest = desk.look.value
     assert at_rest is not None
     assert abs(at_rest) < 10.0
     assert desk.force_g is None
@@ -258,9 +258,9 @@ def test_angle_and_force_come_from_picture_and_load_cell(desk: Desk) -> None:
     until(lambda: desk.force_g is not None)
     assert desk.force_g == pytest.approx(0.0, abs=1.0)
     pressurised(desk)
-    until(lambda: desk.look.angle_deg is not None and desk.look.angle_deg > at_rest + 20.0)
-    assert desk.look.u95_deg is not None
-    assert 0.0 < desk.look.u95_deg < 3.0
+    until(lambda: desk.look.value is not None and desk.look.value > at_rest + 20.0)
+    assert desk.look.u95 is not None
+    assert 0.0 < desk.look.u95 < 3.0
     assert desk.look.jpeg.startswith(b"\xff\xd8")
 
 

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
+from rig.experiment.deformation import BendingMeter
 from rig.spec.calibration import LoadCellCalibration
 from rig.studio.look import Look, Lookout, looked_at
 from rig.vision.measure import AngleMeter
@@ -18,11 +19,11 @@ def jpeg(grey: int) -> bytes:
 
 
 def test_a_picture_that_cannot_be_read_or_trusted_gives_a_reason() -> None:
-    broken = looked_at(b"no picture", AngleMeter())
-    assert (broken.jpeg, broken.angle_deg) == (b"no picture", None)
+    broken = looked_at(b"no picture", BendingMeter(AngleMeter()))
+    assert (broken.jpeg, broken.value) == (b"no picture", None)
     assert "no readable picture" in broken.reason
-    dark = looked_at(jpeg(0), AngleMeter())
-    assert dark.angle_deg is dark.u95_deg is None
+    dark = looked_at(jpeg(0), BendingMeter(AngleMeter()))
+    assert dark.value is dark.u95 is None
     assert "too dark" in dark.reason
     assert dark.jpeg.startswith(b"\xff\xd8")
 
@@ -42,7 +43,7 @@ def test_pictures_that_come_too_fast_replace_each_other() -> None:
         looking.set()
         assert go_on.wait(30)
 
-    lookout = Lookout(AngleMeter(), tell)
+    lookout = Lookout(BendingMeter(AngleMeter()), tell)
     lookout.show(1.0, jpeg(0))
     assert looking.wait(30)
     for time_s in (2.0, 3.0, 4.0):

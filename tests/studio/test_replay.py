@@ -35,7 +35,7 @@ def replay(lab: Workspace) -> Replay:
 
 def test_before_anything_was_measured_nothing_is_claimed(replay: Replay) -> None:
     moment = replay.at(0.0)
-    assert moment.angle_deg is moment.force_g is moment.frame is moment.frame_s is None
+    assert moment.deformation is moment.force_g is moment.frame is moment.frame_s is None
     assert moment.words == "0.0 s"
 
 
@@ -45,7 +45,7 @@ def test_each_point_is_there_while_it_is_measured(lab: Workspace, replay: Replay
         assert moment.pressure_kpa == pytest.approx(point.pressure_kpa, abs=0.1)
         assert f"{point.key.target_kpa:g} kPa" in moment.doing
         if point.unit == "deg":
-            assert moment.angle_deg == pytest.approx(point.value, abs=0.5)
+            assert moment.deformation == pytest.approx(point.value, abs=0.5)
             assert moment.frame_s is not None
             assert point.measured_from_s < moment.frame_s <= point.measured_to_s
         else:

@@ -10,9 +10,10 @@ import pytest
 
 from rig.plant.camera import SensorNoise
 from rig.plant.coverage import Box
+from rig.plant.markers import marker_surfaces
 from rig.plant.optics import Lens, aim
 from rig.plant.scene import developed
-from rig.plant.target import flat_light, marker_surfaces, ruler_surfaces
+from rig.plant.target import flat_light, ruler_surfaces
 from rig.spec.workspace import Workspace
 from rig.validate.picture_budget import Picturing
 from rig.validate.uncertainty import combine

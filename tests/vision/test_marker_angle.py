@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rig.plant.markers import marker_surfaces
 from rig.plant.optics import aim
-from rig.plant.target import flat_light, marker_surfaces
+from rig.plant.target import flat_light
 from rig.vision.marker_angle import MarkerAngleMeter
 from tests.vision.test_displacement import (
     CAMERA,

@@ -13,6 +13,7 @@ from rig.experiment.errors import ExperimentError
 from rig.experiment.prepare import leave_home, make_ready, vent
 from rig.experiment.sweep import go_to
 from rig.link.client import Message, RigLink
+from rig.spec.workspace import Setup
 from rig.vision.measure import AngleMeter
 from rig.vision.segment import decoded
 
@@ -38,6 +39,17 @@ class SwingPlan:
     def below(cls, limit_kpa: float, cycles: int, frames: int) -> SwingPlan:
         """Well off the limit, and off zero pressure, where the plunger may have to pull."""
         return cls(0.2 * limit_kpa, 0.7 * limit_kpa, cycles, frames)
+
+
+def swing_meter(setup: Setup) -> AngleMeter:
+    """What follows the swing; raises ExperimentError for an actuator that does not bend."""
+    if setup.actuator.geometry.deformation != "bending":
+        raise ExperimentError(
+            "the camera's latency is found with an actuator that bends, but "
+            f"'{setup.actuator.name}' lengthens. Nothing was moved. Mount one that bends, as "
+            "models/actuators/bellow-bending.yaml, and give its spec."
+        )
+    return AngleMeter(setup.calibrations.camera, setup.calibrations.ruler)
 
 
 def swing_actuator(

@@ -196,9 +196,9 @@ def joint_soft_body(shape: JointBellow) -> Combined:
     The paper does not show its inlet: here it goes through the lower disc along the axis.
     """
     outer, inner = (_zigzag(shape, side * shape.wall / 2) for side in (1, -1))
-    low, high = outer[0].start[1], shape.length + shape.end
-    ends = (Line((-shape.end, low), (0.0, low)), Line((shape.length, low), (high, low)))
-    inlet = (Line((-shape.end, INLET_RADIUS), (0.0, INLET_RADIUS)),)
+    low, high = outer[0].start[1], shape.end
+    ends = (Line((shape.start, low), (0.0, low)), Line((shape.length, low), (high, low)))
+    inlet = (Line((shape.start, INLET_RADIUS), (0.0, INLET_RADIUS)),)
     return Combined(
         added=(Revolved((ends[0], *outer, ends[1]), axis="z"),),
         removed=(Revolved(inner, axis="z"), Revolved(inlet, axis="z")),

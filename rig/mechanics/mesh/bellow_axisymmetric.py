@@ -84,6 +84,44 @@ class AxisymmetricBellow:
         outside += self.layers * self._segment_of_revolution(self.radius)
         return float(outside - self.cavity_volume)
 
+    @property
+    def start(self) -> float:
+        """z of the clamped foot in m."""
+        return 0.0
+
+    @property
+    def end(self) -> float:
+        """z of the top's outer face in m."""
+        return self.height
+
+    @property
+    def effective_length(self) -> float:
+        """Length that lengthens in m: all layers."""
+        return self.layers * self.pitch
+
+    def soft_mass(self, density: float) -> float:
+        """In kg, without the top; `density` in kg/m3."""
+        return density * self.soft_volume - self.cap_mass(density)
+
+    def cap_mass(self, density: float) -> float:
+        """Of the top in kg."""
+        return float(density * np.pi * self.radius**2 * self.wall)
+
+    def contour(self, samples: int = 12) -> Array:
+        """The outer surface from foot to top, (n, 2) as (z, r); arcs sampled."""
+        half = np.arcsin(np.clip(self.pitch / (2 * self.arc_radius), -1.0, 1.0))
+        turn = np.linspace(-half, half, samples)
+        one = np.column_stack(
+            (
+                self.pitch / 2 + self.arc_radius * np.sin(turn),
+                self.radius + self.sagitta - self.arc_radius * (1 - np.cos(turn)),
+            )
+        )
+        steps = self.collar + self.pitch * np.arange(self.layers)
+        arcs = one + np.stack([steps, np.zeros_like(steps)], axis=-1)[:, None]
+        ends = np.array([[self.start, self.radius], [self.end, self.radius]])
+        return np.concatenate((ends[:1], arcs.reshape(-1, 2), ends[1:]))
+
     def _segment_of_revolution(self, radius: float) -> float:
         """Volume between an arc and its chord at a radius, turned about the axis."""
         chord, arc = self.pitch, self.arc_radius

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rig.mechanics.chambers import ChamberRow
 from rig.mechanics.mesh.chamber_row import RowResolution, mesh_chamber_row
 from rig.mechanics.simulate.bending import BendingModel, bending_model_on
-from rig.mechanics.simulate.linear import LinearModel, linear_model_on
+from rig.mechanics.simulate.linear import HeldLinearModel, LinearModel, linear_model_on
 from rig.mechanics.simulate.solids import Items, Layer
 from rig.spec.chambers import (
     BellowRectangularGeometry,
@@ -50,8 +50,15 @@ def multi_chamber_bending_model(
 
 
 def multi_chamber_linear_model(
-    geometry: MultiChamberLinearGeometry, material: MaterialSpec, *, resolution: RowResolution
-) -> LinearModel:
-    """A cast block of chambers that lengthens, without weight, its cap free along the axis."""
+    geometry: MultiChamberLinearGeometry,
+    material: MaterialSpec,
+    *,
+    resolution: RowResolution,
+    held: bool = False,
+) -> LinearModel | HeldLinearModel:
+    """A cast block of chambers that lengthens, without weight.
+
+    Its cap is free along the axis, or `held`.
+    """
     body = mesh_chamber_row(ChamberRow.of(geometry), resolution, quarter=True)
-    return linear_model_on(body, material)
+    return linear_model_on(body, material, held=held)

@@ -18,7 +18,7 @@ The object touches the top's outer face only.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,7 @@ from rig.mechanics.fe import (
     Support,
     discretise,
 )
-from rig.mechanics.fe.contact import Contact, Sampling
+from rig.mechanics.fe.contact import Contact
 from rig.mechanics.fe.obstacles import Cylinder, Obstacle, Plane, Sphere
 from rig.mechanics.mesh.bellow_axisymmetric import (
     AxisymmetricBellow,
@@ -41,19 +41,19 @@ from rig.mechanics.mesh.bellow_axisymmetric import (
     mesh_axisymmetric_bellow,
     mesh_bellow_quarter,
 )
-from rig.mechanics.simulate.axisymmetric import AxisymmetricModel, axisymmetric_model
+from rig.mechanics.simulate.axisymmetric import (
+    AxisymmetricModel,
+    axisymmetric_model,
+    model_against,
+    top_contact,
+)
 from rig.mechanics.simulate.energies import mixed_energies
-from rig.mechanics.simulate.meridian import supports_of
 from rig.spec.actuator import BellowGripperGeometry
 from rig.spec.material import MaterialSpec
 
 Array = NDArray[np.float64]
 
 FINGERS = 2
-_PENALTY = 25.0
-"""Of Young's modulus over the top's radius: at 40 kPa the object sinks in by 0.1 mm where the
-bellow moves by 15. Multipliers would hold it off at several times the time."""
-_TOLERANCE = 1e-5
 _SPACE = AxisymmetricResolution(wall=1, half_arc=2, collar=1, top=1, top_radius=4)
 _AROUND = 5
 _HOLE = 1e-3
@@ -72,14 +72,15 @@ class GripModel:
     """Nothing is mirrored."""
 
     def measures(self, solution: Solution) -> dict[str, float]:
-        """Force that pulls the object out in N, force that presses it on one side in N, and the
-        area of one side in contact in m2, undeformed."""
+        """Force that pulls the object out in N, force that presses it on one side in N, the area of
+        one side in contact in m2, undeformed, and the volume of both bellows."""
         x = solution.state.x
         touch = self.contact.touch(x)
         return {
             "force": FINGERS * self.friction * self.share * self._grip(x),
             "normal_force": -self.share * float(touch.force[-1]),
             "contact_area": self.share * touch.area,
+            "volume": FINGERS * self.share * solution.volume,
         }
 
     def _grip(self, x: Array) -> float:
@@ -96,13 +97,23 @@ class GripModel:
         return float(np.sum(sampling.weights.reshape(-1) * pressure * slides))
 
 
-def finger_model(geometry: BellowGripperGeometry, material: MaterialSpec) -> AxisymmetricModel:
-    """One bellow without an object."""
-    return axisymmetric_model(geometry.finger, material)
+def finger_model(
+    geometry: BellowGripperGeometry,
+    material: MaterialSpec,
+    *,
+    resolution: AxisymmetricResolution | None = None,
+) -> AxisymmetricModel:
+    """One bellow without an object; the volume is that of both."""
+    finger = axisymmetric_model(geometry.finger, material, resolution=resolution)
+    return replace(finger, bellows=FINGERS)
 
 
 def grip_model(
-    geometry: BellowGripperGeometry, material: MaterialSpec, *, in_space: bool | None = None
+    geometry: BellowGripperGeometry,
+    material: MaterialSpec,
+    *,
+    in_space: bool | None = None,
+    resolution: AxisymmetricResolution | None = None,
 ) -> GripModel:
     """One bellow against the object.
 
@@ -110,28 +121,27 @@ def grip_model(
     MechanicsError for a material without a volumetric energy.
     """
     spatial = geometry.held == "cylinder" if in_space is None else in_space
-    build = _quarter if spatial else _whole
-    return build(geometry, material)
+    if spatial:
+        return _quarter(geometry, material, resolution or _SPACE)
+    return _whole(geometry, material, resolution or AxisymmetricResolution.level(0))
 
 
-def _whole(geometry: BellowGripperGeometry, material: MaterialSpec) -> GripModel:
-    body = mesh_axisymmetric_bellow(AxisymmetricBellow.of(geometry.finger))
+def _whole(
+    geometry: BellowGripperGeometry, material: MaterialSpec, resolution: AxisymmetricResolution
+) -> GripModel:
+    body = mesh_axisymmetric_bellow(AxisymmetricBellow.of(geometry.finger), resolution)
     d = discretise(body.mesh, Kinematics.AXISYMMETRIC)
-    contact = _contact(Sampling.of_facets(d, d.facets_on("top")), geometry, material, dim=2)
-    model = Model(
-        d,
-        [Solid(d, *mixed_energies(material))],
-        supports=supports_of(d),
-        surface=PressureSurface(d, d.facets_on("cavity")),
-        items=[contact],
-    )
+    contact = top_contact(d, _obstacle(geometry, dim=2), geometry.finger, material)
+    model = model_against(d, Solid(d, *mixed_energies(material)), contact)
     return GripModel(model, contact, geometry.friction, share=1)
 
 
-def _quarter(geometry: BellowGripperGeometry, material: MaterialSpec) -> GripModel:
-    mesh = mesh_bellow_quarter(AxisymmetricBellow.of(geometry.finger), _SPACE, _AROUND, _HOLE)
+def _quarter(
+    geometry: BellowGripperGeometry, material: MaterialSpec, resolution: AxisymmetricResolution
+) -> GripModel:
+    mesh = mesh_bellow_quarter(AxisymmetricBellow.of(geometry.finger), resolution, _AROUND, _HOLE)
     d = discretise(mesh)
-    contact = _contact(Sampling.of_facets(d, d.facets_on("top")), geometry, material, dim=3)
+    contact = top_contact(d, _obstacle(geometry, dim=3), geometry.finger, material)
     model = Model(
         d,
         [Solid(d, *mixed_energies(material))],
@@ -144,17 +154,6 @@ def _quarter(geometry: BellowGripperGeometry, material: MaterialSpec) -> GripMod
         items=[contact],
     )
     return GripModel(model, contact, geometry.friction, share=4)
-
-
-def _contact(
-    sampling: Sampling, geometry: BellowGripperGeometry, material: MaterialSpec, dim: int
-) -> Contact:
-    return Contact(
-        sampling,
-        _obstacle(geometry, dim),
-        penalty=_PENALTY * material.young_modulus.value / (geometry.finger.top_diameter / 2),
-        tolerance=_TOLERANCE,
-    )
 
 
 def _obstacle(geometry: BellowGripperGeometry, dim: int) -> Obstacle:

@@ -27,6 +27,7 @@ from rig.mechanics.fe import (
 from rig.mechanics.mesh.bellow_joint import JointBellow, JointResolution, mesh_joint_bellow
 from rig.mechanics.simulate.energies import mixed_energies
 from rig.mechanics.simulate.flanks import Flanks
+from rig.mechanics.simulate.linear import pushed
 from rig.mechanics.simulate.meridian import MeridianModel, supports_of
 from rig.spec.actuator import BellowJointGeometry
 from rig.spec.material import MaterialSpec
@@ -64,17 +65,40 @@ class JointModel(MeridianModel):
         }
 
 
+@dataclass(frozen=True)
+class HeldJointModel(JointModel):
+    """The whole bellow between two fixed discs."""
+
+    def measures(self, solution: Solution) -> dict[str, float]:
+        """Force in N with which the upper disc pushes upwards; volume; the gap between flanks."""
+        d = self.model.discretisation
+        measured = super().measures(solution)
+        del measured["displacement"]
+        return {"force": pushed(solution, d.dim * d.nodes_on("top") + 1), **measured}
+
+
+def held_joint_model(
+    geometry: BellowJointGeometry,
+    material: MaterialSpec,
+    *,
+    resolution: JointResolution | None = None,
+) -> HeldJointModel:
+    """The model with its upper disc held where it is at rest; arguments as in `joint_model`."""
+    held = joint_model(geometry, material, resolution=resolution, moved=0.0)
+    return HeldJointModel(held.model, held.soft, held.density, held.shape)
+
+
 def joint_model(
     geometry: BellowJointGeometry,
     material: MaterialSpec,
     *,
     resolution: JointResolution | None = None,
-    moved: bool = False,
+    moved: float | None = None,
 ) -> JointModel:
     """Mesh the meridian and put its model together.
 
-    `moved` takes hold of the upper disc's outer face: it rises by as many metres as the factor
-    `motion` of a loading says, instead of where pressure brings it. Raises MechanicsError for a
+    `moved` takes hold of the upper disc's outer face: it rises by so many metres times the factor
+    `motion` of a loading, instead of where pressure brings it. Raises MechanicsError for a
     material without a volumetric energy.
     """
     shape = JointBellow.of(geometry)
@@ -82,8 +106,8 @@ def joint_model(
     d = discretise(body.mesh, Kinematics.AXISYMMETRIC)
     soft = Solid(d, *mixed_energies(material))
     supports = supports_of(d)
-    if moved:
-        supports.append(Support.of(d, d.nodes_on("top"), (1,), 1.0))
+    if moved is not None:
+        supports.append(Support.of(d, d.nodes_on("top"), (1,), moved))
     model = Model(
         d,
         [soft],

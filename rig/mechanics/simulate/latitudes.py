@@ -105,7 +105,8 @@ def drive(
     direction on the way: no constant pumping rate gets there.
     """
     moved = how is Drive.DEFORMED
-    actuator = joint_model(geometry, material, resolution=resolution, moved=moved)
+    taken = 1.0 if moved else None  # by 1 m times the motion, which is the way
+    actuator = joint_model(geometry, material, resolution=resolution, moved=taken)
     progress = np.arange(steps + 1) / steps
     way = stroke.elongation * progress
     if moved:

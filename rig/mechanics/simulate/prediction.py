@@ -42,16 +42,13 @@ def free_inflation(
 
 def blocked_inflation(
     actuator: ActuatorSpec, material: MaterialSpec, *, specimen: bool = False
-) -> Inflation | None:
-    """The same with its tip held by a stop; None of a family that is not measured so."""
+) -> Inflation:
+    """The same with its tip held by a stop."""
     geometry = actuator.geometry
     meshing = _meshing(actuator, specimen)
-    build = meshing.blocked
-    if build is None:
-        return None
     return Inflation(
         "tip blocked",
-        lambda: build(geometry, material),
+        lambda: meshing.blocked(geometry, material),
         _key("blocked", actuator, material, specimen),
         actuator.limits.pressure,
         meshing.blocked_options,
@@ -60,14 +57,7 @@ def blocked_inflation(
 
 def _meshing(actuator: ActuatorSpec, specimen: bool) -> Meshing:
     family = FAMILIES[actuator.geometry.family]
-    if not specimen:
-        return family.model
-    if family.specimen is None:
-        raise MechanicsError(
-            f"there is no virtual specimen of the family '{actuator.geometry.family}' yet: it can "
-            "be predicted and exported, not characterised on the virtual bench."
-        )
-    return family.specimen
+    return family.specimen if specimen else family.model
 
 
 def _key(experiment: str, actuator: ActuatorSpec, material: MaterialSpec, specimen: bool) -> str:
@@ -87,19 +77,19 @@ def inflations(
     job: Job,
     *,
     specimen: bool = False,
-) -> tuple[Curves, Curves | None]:
-    """Curves up to `top` in Pa with the tip free, and blocked where the family has that.
+) -> tuple[Curves, Curves]:
+    """Curves up to `top` in Pa, with the tip free and blocked.
 
     Both are computed at once where there is more than one thread.
     """
-    questions = [free_inflation(actuator, material, specimen=specimen)]
-    held = blocked_inflation(actuator, material, specimen=specimen)
-    if held is not None:
-        questions.append(held)
+    questions = [
+        free_inflation(actuator, material, specimen=specimen),
+        blocked_inflation(actuator, material, specimen=specimen),
+    ]
     shared = SharedWatch(job.watch)
     beside = replace(job, watch=shared)
-    curves = side_by_side([partial(q.curves, top, beside) for q in questions], shared.stop)
-    return curves[0], curves[1] if held is not None else None
+    free, blocked = side_by_side([partial(q.curves, top, beside) for q in questions], shared.stop)
+    return free, blocked
 
 
 def finite_element_response(

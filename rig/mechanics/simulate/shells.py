@@ -7,7 +7,7 @@ from rig.mechanics.fe.sliding import Sliding
 from rig.mechanics.mesh.slit_shell import ShellResolution, SlitShellMesh, mesh_slit_shell
 from rig.mechanics.shells import SlitShell
 from rig.mechanics.simulate.bending import BendingModel, bending_model_on
-from rig.mechanics.simulate.linear import LinearModel, linear_model_on
+from rig.mechanics.simulate.linear import HeldLinearModel, LinearModel, linear_model_on
 from rig.mechanics.simulate.solids import Items, Layer
 from rig.spec.material import MaterialSpec
 from rig.spec.shells import (
@@ -78,13 +78,21 @@ def _sliding(
 
 
 def shell_linear_model(
-    geometry: ShellReinforcedLinearGeometry, material: MaterialSpec, *, resolution: ShellResolution
-) -> LinearModel:
-    """A core in a shell that slides all round; without weight, its cap free along the axis."""
+    geometry: ShellReinforcedLinearGeometry,
+    material: MaterialSpec,
+    *,
+    resolution: ShellResolution,
+    held: bool = False,
+) -> LinearModel | HeldLinearModel:
+    """A core in a shell that slides all round; without weight.
+
+    Its cap is free along the axis, or `held`.
+    """
     body = mesh_slit_shell(SlitShell.of(geometry), resolution, quarter=True)
     return linear_model_on(
         body,
         material,
         layer=_film(geometry, body),
         interfaces=lambda d: [_sliding(d, geometry, material)],
+        held=held,
     )

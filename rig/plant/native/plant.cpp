@@ -68,8 +68,8 @@ struct plant {
   }
   double gauge() const { return now.syringe.pressure(par) - par.ambient_pressure; }
   double actuator_gauge() const { return now.actuator.pressure(par) - par.ambient_pressure; }
-  double angle() const {
-    return shape(response.angle, now.fixture == PLANT_BLOCKED ? 0.0 : now.wall.shape);
+  double deformation() const {
+    return shape(response.deformation, now.fixture == PLANT_BLOCKED ? 0.0 : now.wall.shape);
   }
   double force() const {
     return now.fixture == PLANT_BLOCKED ? shape(response.blocked_force, now.wall.shape) : 0.0;
@@ -240,7 +240,7 @@ void plant_get_truth(const plant *p, plant_truth *truth) {
   const State &now = p->now;
   truth->time = now.time;
   truth->gauge_pressure = p->gauge();
-  truth->angle = p->angle();
+  truth->deformation = p->deformation();
   truth->force = p->force();
   truth->actuator_volume = now.actuator.volume;
   truth->pushed_volume = now.drive.pushed_volume;

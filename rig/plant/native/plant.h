@@ -21,7 +21,7 @@ enum { PLANT_TABLE = 1024, PLANT_PLAYS = 3, PLANT_CREEPS = 4 };
 /* Quasi-static response over uniform gauge pressures from table_low to table_high. */
 typedef struct {
   double table_low, table_high;
-  double angle[PLANT_TABLE];          /* rad, tip free */
+  double deformation[PLANT_TABLE];    /* rad or m, tip free */
   double blocked_force[PLANT_TABLE];  /* N, tip blocked */
   double volume_free[PLANT_TABLE];    /* m3 */
   double volume_blocked[PLANT_TABLE]; /* m3 */
@@ -112,7 +112,7 @@ typedef struct {
 /* What is really so; never reaches the measurement path. `peak_pressure` is the highest gauge
  * pressure anywhere since power-on; `valve_opened` and `valve_open` are of the valve output. */
 typedef struct {
-  double time, gauge_pressure, angle, force, actuator_volume, pushed_volume, gas_moles;
+  double time, gauge_pressure, deformation, force, actuator_volume, pushed_volume, gas_moles;
   double temperature;
   double actuator_pressure, peak_pressure;
   double valve_opened; /* when the closed valve was last opened */

@@ -24,7 +24,7 @@ ORDERS: tuple[tuple[str, Opcode, float], ...] = (
 FIGURES = (
     ("pressure", "pressure", "kPa"),
     ("set-point", "setpoint", "kPa"),
-    ("angle", "angle", "deg"),
+    ("deformation", "deformation", ""),  # its unit is the actuator's
     ("force", "force", "g"),
     ("plunger", "plunger", "mL"),
     ("state", "state", ""),
@@ -135,7 +135,7 @@ class BenchPage:
             heading("Camera")
             ui.html(
                 '<img data-live="camera" alt="side view of the actuator" hidden>'
-                '<p class="muted">Cyan and orange: the edges that the angle is measured between; '
+                '<p class="muted">Cyan and orange: the edges or markers that are measured; '
                 "green: the marks of the ruler.</p>",
                 sanitize=False,
             )

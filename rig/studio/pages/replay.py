@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -22,10 +22,7 @@ STEP_S = 0.1
 """Of the slider, and so of the arrow keys on it."""
 PLAY_S = 0.1
 SPEEDS = {1.0: "real time", 5.0: "5 x", 20.0: "20 x"}
-RESPONSES: tuple[tuple[ExperimentName, str], ...] = (
-    ("deformation", "bending angle (deg)"),
-    ("blocked_force", "blocked force (g)"),
-)
+RESPONSES: tuple[ExperimentName, ...] = ("deformation", "blocked_force")
 
 
 @dataclass(frozen=True)
@@ -94,11 +91,14 @@ class ReplayPanel:
         names = short_names([p.replay.name for p in self._played])
         replays = list(zip(names, (p.replay for p in self._played), strict=True))
         pressures = [Trace(name, r.trace.time_s, r.trace.pressure_kpa) for name, r in replays]
-        angles = [Trace(name, r.angle.time_s, r.angle.value, marks=True) for name, r in replays]
+        deformed = [
+            Trace(name, r.deformation.time_s, r.deformation.value, marks=True)
+            for name, r in replays
+        ]
         forces = [Trace(name, r.force.time_s, r.force.value) for name, r in replays]
         for traces, quantity in (
             (pressures, "pressure (kPa)"),
-            (angles, "bending angle (deg)"),
+            (deformed, _deformation_axis(r for _, r in replays)),
             (forces, "force (g)"),
         ):
             if any(trace.x.size for trace in traces):
@@ -107,7 +107,10 @@ class ReplayPanel:
 
     def _over_pressure(self) -> None:
         names = short_names([p.replay.name for p in self._played])
-        for experiment, quantity in RESPONSES:
+        for experiment in RESPONSES:
+            quantity = "blocked force (g)"
+            if experiment == "deformation":
+                quantity = _deformation_axis(p.replay for p in self._played)
             levels = [
                 level
                 for name, p in zip(names, self._played, strict=True)
@@ -150,6 +153,12 @@ class ReplayPanel:
 
     def _go_beside(self, step: int) -> None:
         self._slider.value = self._played[0].replay.beside(number_of(self._slider.value, 0.0), step)
+
+
+def _deformation_axis(replays: Iterable[Replay]) -> str:
+    """Words for an axis; of both, where one run bends and another lengthens."""
+    measurands = dict.fromkeys(replay.measurand for replay in replays)
+    return " or ".join(f"{m.quantity} ({m.unit})" for m in measurands)
 
 
 def _chart(options: Options) -> Any:

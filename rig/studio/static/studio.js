@@ -55,7 +55,8 @@ function showBench(news) {
   tell("state", news.connected ? news.state : "no bench");
   tell("flags", news.connected ? news.flags : "");
   tell("force", fixed(news.force, 2));
-  tell("angle", news.connected ? fixed(news.angle, 1) : "-");
+  const known = news.connected && news.deformation !== null;
+  tell("deformation", known ? `${fixed(news.deformation, 1)} ${news.unit}` : "-");
   tellIfAny("fault", fault);
   tellIfAny("said", news.said);
   tellIfAny("question", news.question ? `${news.question}, then press "Done as asked".` : "");
@@ -89,10 +90,11 @@ function fixed(value, digits) {
 
 function notes(news, now) {
   const said = [];
-  const age = now - news.angle_s;
-  if (news.no_angle) said.push(`No angle: ${news.no_angle}.`);
-  else if (news.angle !== null) {
-    said.push(`The angle is known within ${news.angle_u95.toFixed(1)} deg (95 %)` +
+  const age = now - news.deformation_s;
+  if (news.no_deformation) said.push(`No ${news.quantity}: ${news.no_deformation}.`);
+  else if (news.deformation !== null) {
+    said.push(`The ${news.quantity} is known within ` +
+      `${news.deformation_u95.toPrecision(2)} ${news.unit} (95 %)` +
       (age > STALE_S ? `, from a picture ${age.toFixed(0)} s old.` : "."));
   }
   if (news.force === null && news.connected) said.push("No force: the load cell is not tared.");
