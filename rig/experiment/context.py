@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from rig.experiment.bench import Bench, Fixture, Observer
 from rig.experiment.deformation import DeformationMeter, needs_rest, recorded_meter
-from rig.experiment.prepare import tare
 from rig.experiment.errors import ExperimentError
+from rig.experiment.prepare import tare
 from rig.experiment.recheck import LOOKS, recheck_camera
 from rig.experiment.setup import RunRequest
 from rig.link.client import RigLink
