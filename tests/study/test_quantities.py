@@ -131,7 +131,8 @@ def test_the_tip_is_blocked_only_where_its_force_is_asked_for(
         built.append("blocked")
         return tube(geometry, material)
 
-    monkeypatch.setitem(FAMILIES, "bellow-bending", Family(Meshing(tube, held)))
+    tubes = Meshing(tube, held)
+    monkeypatch.setitem(FAMILIES, "bellow-bending", Family(tubes, tubes))
     monkeypatch.setenv("RIG_CACHE_DIR", str(tmp_path))
     wanted = StudyResponse.model_validate(
         {"name": "wanted", "quantity": quantity, "model": "fe", "pressure": "1 kPa"}
