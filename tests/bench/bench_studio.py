@@ -64,6 +64,7 @@ MOVES = """async () => {
 def main() -> None:
     """Print the tables."""
     _pages()
+    _hour_of_a_browser()
     _hour()
     print("\nwatchers  messages/s  99 % gap     pictures/s  polls/s  longest poll gap  behind  CPU")
     for watchers in (0, 1, 4):
@@ -72,18 +73,8 @@ def main() -> None:
 
 def _pages() -> None:
     """Wall times within the browser, and what they cost the server; a cold and five warm visits."""
-    from playwright.sync_api import sync_playwright
-
-    executable = shutil.which("chromium")
-    if executable is None:
-        print("no chromium: first page and slider were not measured")
-        return
     visits = []
-    with ExitStack() as stack:
-        place = stack.enter_context(tempfile.TemporaryDirectory())
-        address, pid = stack.enter_context(_server(Path(place)))
-        kit = stack.enter_context(sync_playwright())
-        browser = kit.chromium.launch(executable_path=executable, args=["--no-sandbox"])
+    with _browser() as (browser, address, pid):
         for _ in range(VISITS):
             page = browser.new_context().new_page()
             session = page.context.new_cdp_session(page)
@@ -96,7 +87,6 @@ def _pages() -> None:
         cpu_s, spent_s = _cpu_s(pid), _spent_s(session)
         moves = page.evaluate(MOVES)
         each = (_cpu_s(pid) - cpu_s) / len(moves), (_spent_s(session) - spent_s) / len(moves)
-        browser.close()
     warm = np.median(visits[1:], axis=0)
     print("first page   shown after   server CPU   browser CPU")
     for name, (seen, server, script) in (("cold", visits[0]), ("warm", warm)):
@@ -106,6 +96,49 @@ def _pages() -> None:
         f"ms of {len(moves)}; CPU of each {1e3 * each[0]:.0f} ms in the server, "
         f"{1e3 * each[1]:.0f} ms in the browser; load of the machine {os.getloadavg()[0]:.1f}"
     )
+
+
+def _hour_of_a_browser() -> None:
+    """Memory of server and page while a browser watches for an hour of bench time."""
+    with _browser() as (browser, address, pid):
+        page = browser.new_context().new_page()
+        page.set_default_timeout(0)
+        session = page.context.new_cdp_session(page)
+        session.send("Performance.enable")
+        page.goto(f"{address}/bench")
+        page.get_by_role("button", name="Take control", exact=True).click()
+        page.get_by_label("speed").click()
+        page.get_by_role("option", name="as fast as it can").click()
+        page.get_by_role("button", name="Connect", exact=True).click()
+        print("\nbench time, min   server, MiB   heap of the page, MiB   its nodes")
+        for minutes in (5, 20, 40, 60):
+            page.wait_for_function(
+                "s => Number(document.querySelector('[data-live=time]').textContent) > s",
+                arg=60 * minutes,
+            )
+            session.send("HeapProfiler.collectGarbage")
+            now = _metrics(session)
+            print(
+                f"{minutes:15d}   {_resident_mib(pid):11.1f}   "
+                f"{now['JSHeapUsedSize'] / 2**20:21.1f}   {now['Nodes']:9.0f}"
+            )
+
+
+@contextmanager
+def _browser() -> Iterator[tuple[Any, str, int]]:
+    """A browser, the address of a studio, and its process id."""
+    from playwright.sync_api import sync_playwright
+
+    executable = shutil.which("chromium")
+    if executable is None:
+        raise SystemExit("there is no chromium here: apt-get install chromium")
+    with ExitStack() as stack:
+        place = stack.enter_context(tempfile.TemporaryDirectory())
+        address, pid = stack.enter_context(_server(Path(place)))
+        kit = stack.enter_context(sync_playwright())
+        browser = kit.chromium.launch(executable_path=executable, args=["--no-sandbox"])
+        yield browser, address, pid
+        browser.close()
 
 
 @contextmanager
@@ -139,8 +172,11 @@ def _cpu_s(pid: int) -> float:
 
 def _spent_s(session: Any) -> float:
     """What the page's main thread has worked."""
-    metrics = {m["name"]: m["value"] for m in session.send("Performance.getMetrics")["metrics"]}
-    return float(metrics["TaskDuration"])
+    return _metrics(session)["TaskDuration"]
+
+
+def _metrics(session: Any) -> dict[str, float]:
+    return {m["name"]: m["value"] for m in session.send("Performance.getMetrics")["metrics"]}
 
 
 def _hour() -> None:
@@ -162,8 +198,8 @@ def _hour() -> None:
         desk.close()
 
 
-def _resident_mib() -> float:
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
+def _resident_mib(pid: int | str = "self") -> float:
+    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
