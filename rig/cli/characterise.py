@@ -37,7 +37,9 @@ def characterise(
         bool, typer.Option("--dry-run", help="Check and print the plan; move nothing.")
     ] = False,
 ) -> None:
-    """Measure angle and blocked force against pressure, compare with the models, report.
+    """Measure deformation and blocked force against pressure, compare with models, report.
+
+    Actuators that bend are measured by their angle, those that lengthen by two markers.
 
     Runs on the virtual bench unless told otherwise. Ctrl-C vents the bench and closes the log;
     `rig resume` continues such a run.

@@ -75,7 +75,7 @@ def predict(
         typer.Option(help="write a page with a 3D view of stress and strain to this HTML file"),
     ] = None,
 ) -> None:
-    """Predict angle, length difference, blocked force and cavity volume of an actuator.
+    """Predict angle or elongation, blocked force and cavity volume of an actuator.
 
     Nothing moves: this only computes.
 

@@ -28,8 +28,8 @@ def watch(
     Starts when somebody subscribes and ends with the run. A run in progress is followed through
     its log, so that watching never disturbs it: what happened before comes at once, and then what
     happens, a second late on a real bench. Simulated runs write their log in larger pieces. Nobody
-    can send anything to a run. The layout beside the log shows pressure, angle, load cell, camera
-    and events.
+    can send anything to a run. The layout beside the log shows pressure, deformation, load cell,
+    camera and events.
 
     Example: `rig watch logs/bellow-bending-virtual-seed1 --speed 5`
     """

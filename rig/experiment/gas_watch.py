@@ -25,8 +25,8 @@ hundreds of cycles the estimated volume was 8 mL off, seventeen times its uncert
 LEAK_PRESSURE = 10e3
 """Pa gauge at which leaks are told, as in bench specs."""
 USUAL_CAVITY = 13e-6
-"""m3 of the bending bellow, for which the filter's errors by stroke were found; a larger cavity is off
-a straight line by as much more."""
+"""m3 of the bending bellow, for which the filter's errors by stroke were found; a larger cavity is
+off a straight line by as much more."""
 LINE_U = 0.1
 CAVITY_U = 0.03
 SYRINGE_U = 0.003

@@ -34,7 +34,7 @@ MOVE_OFF_HOME = 1.5e-6
 FASTEST_RATE = 100e3
 """Pa/s; the board takes no faster set-point (rig.dbc)."""
 FIRST_LOOK_S = 2.0
-"""Before, the pressure is still settling and the angle says more of that than of creep."""
+"""Before, the pressure is still settling and the deformation says more of that than of creep."""
 SHORTEST_S = 0.1
 """From corner to corner; a set-point and its rate take two acknowledgements, some 0.04 s."""
 DEFORMATION_PIECES = 20
@@ -53,7 +53,7 @@ class Program:
     times: Array
     values: Array
     looks: tuple[float, ...] = ()
-    """Seconds since the start at which the camera is asked for the angle."""
+    """Seconds since the start at which the camera is asked for the deformation."""
     notes: tuple[str, ...] = ()
 
     @property

@@ -1,4 +1,4 @@
-"""Whether the camera's calibration still holds, looked at before the first angle of a run.
+"""Whether the camera's calibration still holds, looked at before the first picture of a run counts.
 
 Through the right lens the marks of the ruler lie on a flat grid. A lens whose focus or zoom was
 touched, or a calibration of another one, leaves them off it by more than they can be printed off.
