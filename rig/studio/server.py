@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import signal
+from types import FrameType
+from typing import NoReturn
 
 from fastapi import FastAPI
 from nicegui import core, ui
@@ -64,7 +67,7 @@ def warm_up(workspace: Workspace) -> None:
 
 
 def serve(studio: Studio, access: Access, *, verbose: bool) -> None:
-    """Serve until somebody presses Ctrl-C; leaves nothing running.
+    """Serve until somebody presses Ctrl-C, or a signal ends it; leaves nothing running.
 
     `verbose` writes tracebacks of what fails in a library.
     """
@@ -72,6 +75,10 @@ def serve(studio: Studio, access: Access, *, verbose: bool) -> None:
 
     configure(verbose=verbose)
     warm_up(studio.workspace)
+    # the server ends in order on SIGTERM, then lets the signal have its way with the process
+    signal.signal(signal.SIGTERM, _leave)
+    if hasattr(signal, "SIGHUP"):  # the terminal was closed
+        signal.signal(signal.SIGHUP, lambda *_: signal.raise_signal(signal.SIGTERM))
     try:
         uvicorn.run(
             application(studio, access),
@@ -85,3 +92,7 @@ def serve(studio: Studio, access: Access, *, verbose: bool) -> None:
         )
     finally:
         studio.close()
+
+
+def _leave(number: int, _frame: FrameType | None) -> NoReturn:
+    raise SystemExit(128 + number)

@@ -121,7 +121,8 @@ def test_finite_elements_go_from_start_to_result(pages: Pages, studio: str) -> N
     page.close()
 
 
-def test_finite_elements_are_cancelled_and_two_designs_compared(pages: Pages, studio: str) -> None:
+@pytest.mark.slow  # a solid; a calculation that is cancelled is in test_calculation
+def test_finite_elements_are_cancelled(pages: Pages, studio: str) -> None:
     page = pages()
     _open(page, studio)
     page.get_by_label("bellow number").fill("2")
@@ -131,6 +132,13 @@ def test_finite_elements_are_cancelled_and_two_designs_compared(pages: Pages, st
     page.get_by_text("finite elements, tip free").wait_for()
     _press(page, "Cancel")
     page.get_by_text("cancelled; what finite elements reached is kept").wait_for()
+    page.close()
+
+
+def test_two_designs_are_compared(pages: Pages, studio: str) -> None:
+    page = pages()
+    _open(page, studio)
+    _sound(page)
     _press(page, "Pin for comparison")
     page.get_by_label("wall thickness (mm)").fill("1.4")
     row = page.get_by_role("row", name="wall thickness 1.5 mm 1.4")
