@@ -7,7 +7,9 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from ruamel.yaml import YAML
 
+import rig
 from rig.link.faults import HINTS
 from rig.spec.schema import schemas
 from tests.evidence import Evidence
@@ -41,6 +43,19 @@ def test_every_extra_is_on_the_page_of_the_installation() -> None:
     section = (ROOT / "docs/install.md").read_text("utf-8").split("## Extras")[1].split("\n## ")[0]
     extras = re.findall(r"^\| `(\w+)` \|", section, re.MULTILINE)
     assert sorted(extras) == sorted(project["optional-dependencies"])
+
+
+def test_the_citation_names_the_version_of_the_package() -> None:
+    citation = YAML(typ="safe").load((ROOT / "CITATION.cff").read_text("utf-8"))
+    assert {"cff-version", "message", "title", "authors"} <= set(citation)
+    assert citation["version"] == rig.__version__
+
+
+def test_every_verb_is_in_the_table_of_the_readme(commands: str) -> None:
+    readme = (ROOT / "README.md").read_text("utf-8")
+    verbs = re.findall(r"^## `rig ([\w-]+)`", commands, re.MULTILINE)
+    assert len(verbs) > 20
+    assert [verb for verb in verbs if f"`rig {verb}" not in readme] == []
 
 
 def test_options_stand_with_their_help_and_default(commands: str) -> None:

@@ -11,6 +11,7 @@ from nicegui import events, ui
 
 from rig.errors import RigError
 from rig.mechanics.model import available_models
+from rig.spec.material import MaterialSpec
 from rig.studio.beside import Design, compared
 from rig.studio.charts import moved, response_options
 from rig.studio.curves import Beam, Curve
@@ -29,6 +30,7 @@ from rig.studio.drawing import profile_svg, section_svg
 from rig.studio.errors import StudioError
 from rig.studio.pages.frame import frame, heading, number_of, say, telling, text_of
 from rig.studio.pages.work import Progress
+from rig.studio.properties import properties_of
 from rig.studio.section import section_of
 from rig.studio.state import Studio
 from rig.studio.works import FINITE_ELEMENTS, FieldsAnswer, File, Format, export, finite_elements
@@ -97,6 +99,7 @@ class DesignPage:
         self._material = ui.select(
             self._studio.workspace.names("material"), label="material", on_change=self._new_material
         ).props("outlined dense")
+        self._properties = ui.html("", sanitize=False)
         heading("Parameters")
         self._parameters = ui.column().classes("stack")
         self._limit = self._input(LIMIT, "pressure limit", "the highest gauge pressure", "kPa")
@@ -241,6 +244,9 @@ class DesignPage:
                 if checked.is_sound
                 else '<div class="problem">Mend what is marked.</div>'
             )
+        self._properties.content = (
+            "" if checked.material is None else properties_html(checked.material)
+        )
         if checked.spec is None or checked.material is None:
             return
         try:
@@ -383,3 +389,16 @@ class DesignPage:
         self._view.set_visibility(True)
         self._draw_responses()
         self._compare()
+
+
+def properties_html(material: MaterialSpec) -> str:
+    """What the material is known by, folded away."""
+    lines = "".join(
+        f'<tr><th scope="row">{html.escape(p.what)}</th><td>{html.escape(p.value)}'
+        f'<br><span class="muted">{html.escape(p.source)}</span></td></tr>'
+        for p in properties_of(material)
+    )
+    return (
+        f"<details><summary>What {html.escape(material.name)} is known by</summary>"
+        f'<table class="plain">{lines}</table></details>'
+    )
