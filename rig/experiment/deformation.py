@@ -15,7 +15,7 @@ from rig.spec.measurand import MEASURANDS, Measurand
 from rig.spec.workspace import BenchCalibrations, Setup
 from rig.validate.picture_budget import Picturing
 from rig.validate.uncertainty import Component, combine
-from rig.vision.displacement import DisplacementMeter
+from rig.vision.displacement import DisplacementMeasurement, DisplacementMeter
 from rig.vision.errors import UntrustedFrameError
 from rig.vision.measure import AngleMeasurement, AngleMeter
 from rig.vision.overlay import COVERAGE_FACTOR, draw_displacement, draw_overlay, draw_rejected
@@ -122,7 +122,18 @@ class ElongationMeter:
 
     def see(self, image: Image) -> Sight:
         """What a frame shows."""
+        return self._sight(self.meter.measure(image))
+
+    def drawn(self, image: Image) -> tuple[Sight, Image]:
+        """The same with markers and elongation."""
         found = self.meter.measure(image)
+        sight = self._sight(found)
+        if sight.value is None:
+            return sight, draw_rejected(image, sight.reason, found.geometry)
+        words = f"{sight.value:.2f} +- {COVERAGE_FACTOR * sight.u:.2f} mm"
+        return sight, draw_displacement(image, found.geometry, words)
+
+    def _sight(self, found: DisplacementMeasurement) -> Sight:
         if found.displacement_mm is None or found.parts is None:
             return rejected(found.reason)
         parts = self.picturing.components(found.parts, self.measurand.unit)
@@ -130,14 +141,6 @@ class ElongationMeter:
         if u > MAX_U_MM:
             return rejected(f"the elongation would be uncertain by {u:.1f} mm")
         return Sight(found.displacement_mm, parts, 1 - u / MAX_U_MM, "")
-
-    def drawn(self, image: Image) -> tuple[Sight, Image]:
-        """The same with markers and elongation."""
-        sight, found = self.see(image), self.meter.measure(image)
-        if sight.value is None:
-            return sight, draw_rejected(image, sight.reason, found.geometry)
-        words = f"{sight.value:.2f} +- {COVERAGE_FACTOR * sight.u:.2f} mm"
-        return sight, draw_displacement(image, found.geometry, words)
 
 
 @dataclass

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -116,6 +117,19 @@ def test_who_watches_gets_the_elongation_since_the_first_good_frame(run: Virtual
     assert rest is not None
     known = ElongationMeter.at_rest(decoded(rest), setup.calibrations).see(pictures[4])
     assert last.value == pytest.approx(known.value, abs=0.05)
+
+
+def test_an_elongation_too_uncertain_is_no_measurement(run: VirtualRun) -> None:
+    calibrations = request().setup.calibrations
+    rest = run.reader.rest_image()
+    assert rest is not None
+    known = ElongationMeter.at_rest(decoded(rest), calibrations)
+    # markers anywhere within a metre of the plane
+    lost = replace(known, picturing=replace(known.picturing, out_of_plane_u_mm=1e3))
+    picture = decoded([i.jpeg for i in run.reader.images() if i.key is not None][4])
+    assert known.see(picture).accepted
+    assert "would be uncertain by" in lost.see(picture).reason
+    assert not lost.drawn(picture)[0].accepted
 
 
 def test_a_run_without_rest_says_what_is_missing() -> None:
