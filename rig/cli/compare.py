@@ -52,7 +52,7 @@ def compare(
                 else f"differs at {agreement.beyond} of {agreement.levels} pressures from"
             )
             console.print(
-                f"{escape(agreement.run)} {verdict} {escape(named[0].name)}; "
+                f"{escape(agreement.run)} {verdict} {escape(agreement.first)}; "
                 f"the largest difference for its uncertainty is {agreement.difference:+.3g} "
                 f"{experiment.unit} at {agreement.pressure_kpa:g} kPa (En {agreement.en:+.2g}).",
                 soft_wrap=True,

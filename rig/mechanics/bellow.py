@@ -37,7 +37,8 @@ def bending_geometry(actuator: ActuatorSpec, what: str) -> BellowBendingGeometry
         return geometry
     raise MechanicsError(
         f"{what} is for the family 'bellow-bending' only, but actuator '{actuator.name}' is a "
-        f"'{geometry.family}'. `rig predict` and `rig export` work for every family."
+        f"'{geometry.family}'. `rig predict`, `characterise` and `export` work for every "
+        "family."
     )
 
 

@@ -17,7 +17,7 @@ from rig.report.charts import Chart, Residuals, comparison_chart, residual_chart
 from rig.report.data import EXPERIMENTS
 from rig.report.errors import ReportError
 from rig.report.figures import branch_of
-from rig.report.page import TITLES, environment
+from rig.report.page import environment
 from rig.report.summary import ExperimentSummary, LevelSummary, RunSummary
 from rig.report.words import number, significant, uncertain
 from rig.validate.metrics import en_number
@@ -37,6 +37,7 @@ class Agreement:
     """The largest difference of a run from the first one, against their uncertainties."""
 
     run: str
+    first: str
     difference: float
     pressure_kpa: float
     en: float
@@ -88,6 +89,7 @@ def agreements(runs: Sequence[NamedRun], experiment: ExperimentName) -> list[Agr
         found.append(
             Agreement(
                 run=other.name,
+                first=first.name,
                 difference=there[worst].mean - here[worst].mean,
                 pressure_kpa=worst,
                 en=ens[worst],
@@ -137,17 +139,19 @@ class ComparedExperiment:
 def compare(runs: Sequence[NamedRun]) -> list[ComparedExperiment]:
     """Lay runs beside each other, experiment by experiment; those nobody measured are left out.
 
-    Raises ReportError if no experiment was measured in any run.
+    Bending angles and elongations are apart: one is no error of the other. Raises ReportError if no
+    experiment was measured in any run.
     """
     found = []
     for name in EXPERIMENTS:
-        having = [
-            (run, run.summary.experiments[name])
-            for run in runs
-            if name in run.summary.experiments and run.summary.experiments[name].points
-        ]
-        if having:
-            found.append(_compared(name, having, agreements(runs, name)))
+        alike: dict[str, list[tuple[NamedRun, ExperimentSummary]]] = {}
+        for run in runs:
+            experiment = run.summary.experiments.get(name)
+            if experiment is not None and experiment.points:
+                alike.setdefault(experiment.unit, []).append((run, experiment))
+        for having in alike.values():
+            agreed = agreements([run for run, _ in having], name)
+            found.append(_compared(name, having, agreed))
     if not found:
         raise ReportError("none of these runs has a measured point: there is nothing to compare.")
     return found
@@ -162,20 +166,20 @@ def _compared(
     first = having[0][1]
     names = ", ".join(run.name for run, _ in having)
     chart = comparison_chart(
-        f"{name}-comparison",
+        f"{name}-{first.unit}-comparison",
         f"{first.quantity} ({first.unit})",
         [branch_of(experiment, "up", run.name) for run, experiment in having],
         f"{first.quantity.capitalize()} against pressure of the runs {names}.",
     )
     differences = [d for d in (_differences(having[0], other) for other in having[1:]) if d]
     return ComparedExperiment(
-        title=TITLES[name],
+        title=first.quantity.capitalize(),
         unit=first.unit,
         models=models,
         rows=tuple(_row(run, experiment, models) for run, experiment in having),
         chart=chart,
         differences=residual_chart(
-            f"{name}-differences",
+            f"{name}-{first.unit}-differences",
             f"difference from the first run ({first.unit})",
             differences,
             f"Difference of the {first.quantity} from the run {having[0][0].name}, with the "

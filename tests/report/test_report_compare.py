@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ from html_page import Page
 from synthetic_run import SHORT, Story, write_synthetic_run
 
 from rig.cli.main import main
-from rig.report.compare import agreements, compare, read_runs, write_comparison
+from rig.report.compare import NamedRun, agreements, compare, read_runs, write_comparison
 from rig.report.errors import ReportError
 
 
@@ -61,7 +62,7 @@ def test_the_comparison_is_one_offline_page_and_always_the_same(
     write_comparison(tmp_path / "two.html", runs)
     assert (tmp_path / "one.html").read_bytes() == (tmp_path / "two.html").read_bytes()
     page = Page((tmp_path / "one.html").read_text())
-    assert [e.title for e in experiments] == ["Deformation", "Blocked force"]
+    assert [e.title for e in experiments] == ["Bending angle", "Blocked force"]
     assert len(list(page.all("svg"))) == 4
     assert not list(page.all("script"))
     for run in runs:
@@ -76,6 +77,21 @@ def test_runs_of_different_experiments_stand_side_by_side(run_folder: Path, tmp_
     assert deformation.differences is None
     assert [row.run for row in force.rows] == ["whole", "force"]
     assert len(force.agreements) == 1
+
+
+def test_angles_and_elongations_are_not_held_against_each_other(run_folder: Path) -> None:
+    bent, other = read_runs([run_folder, run_folder])
+    long = other.summary.experiments["deformation"].model_copy(
+        update={"unit": "mm", "quantity": "elongation"}
+    )
+    experiments = other.summary.experiments | {"deformation": long}
+    lengthened = NamedRun("long", other.summary.model_copy(update={"experiments": experiments}))
+    angle, elongation, force = compare([bent, lengthened, replace(lengthened, name="longer")])
+    assert [row.run for row in angle.rows] == [bent.name]
+    assert angle.agreements == ()
+    assert [(a.run, a.first) for a in elongation.agreements] == [("longer", "long")]
+    assert len(force.agreements) == 2
+    assert (angle.title, elongation.title) == ("Bending angle", "Elongation")
 
 
 def test_comparing_needs_two_runs_and_a_point(run_folder: Path, tmp_path: Path) -> None:
@@ -113,7 +129,7 @@ def test_rig_compare_prints_tables_and_writes_the_page(
     out = tmp_path / "page.html"
     rig("compare", run_folder, other_run_folder, "--out", out)
     printed = capsys.readouterr().out
-    assert "Deformation" in printed
+    assert "Bending angle" in printed
     assert "other" in printed
     assert out.is_file()
     rig("compare", run_folder, other_run_folder, "--out", out, "--json")
