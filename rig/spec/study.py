@@ -20,6 +20,7 @@ QuantityName = Literal[
     "volume",
     "max_von_mises",
     "angle_range",
+    "inner_radius",
     "tip_travel",
     "max_strain",
     "safety_factor",

@@ -7,6 +7,7 @@ Beside the columns of `rig predict` there are
   the pressures, of a bellow that bends with constant curvature over a bottom that keeps its length.
   One pressure moves the tip along one curve, so two numbers tell its size: how far the end cap
   turns, and how far apart the ends of the curve are.
+- `inner_radius`: of the bent inner side, which keeps its length (Yin et al., eqs. 4 and 5).
 - `max_strain` and `safety_factor`: how near the material is to tearing, notches included, by
   `rig.mechanics.strength`. The factor is that of the governing criterion.
 - `outer_diameter` and `groove_width`: what the shape at rest is, for limits of space and printers.
@@ -22,6 +23,7 @@ from rig.mechanics.bellow import BellowShape, bending_geometry
 from rig.mechanics.fe.extremes import Extremes
 from rig.mechanics.job import Job
 from rig.mechanics.model import predict
+from rig.mechanics.outline import body_of
 from rig.mechanics.response import Response, interpolated
 from rig.mechanics.simulate.prediction import free_inflation
 from rig.mechanics.strength import safety
@@ -39,6 +41,7 @@ UNITS: dict[QuantityName, str] = {
     "volume": "ml",
     "max_von_mises": "kpa",
     "angle_range": "deg",
+    "inner_radius": "mm",
     "tip_travel": "mm",
     "max_strain": "percent",
     "safety_factor": "1",
@@ -119,6 +122,12 @@ def _angle_range(asked: Asked, pressure: float) -> float:
     return float(np.degrees(bent - rest))
 
 
+def _inner_radius(asked: Asked, pressure: float) -> float:
+    length = body_of(asked.actuator.geometry).effective_length
+    _, bent = asked.angles(pressure)
+    return 1e3 * length / bent if bent > 0 else float("inf")
+
+
 def _tip_travel(asked: Asked, pressure: float) -> float:
     shape = BellowShape.of(bending_geometry(asked.actuator, "The tip's travel"))
     beyond = shape.tip - shape.effective_length
@@ -169,6 +178,7 @@ def _groove_width(asked: Asked, _: float) -> float:
 
 _DERIVED: dict[QuantityName, Callable[[Asked, float], float]] = {
     "angle_range": _angle_range,
+    "inner_radius": _inner_radius,
     "tip_travel": _tip_travel,
     "max_strain": _max_strain,
     "safety_factor": _safety_factor,

@@ -155,7 +155,7 @@ def _of_revolution() -> None:
         node = model.top if isinstance(model, JointModel) else model.top_centre
         with tempfile.TemporaryDirectory() as folder:
             write_deck(Path(folder) / "body.inp", model, pressure=pressure, increments=2)
-            _run("body", folder)
+            run("body", folder)
             printed = (Path(folder) / "body.dat").read_text(encoding="ascii")
         theirs = float(re.findall(rf"^ +{node + 1} +\S+ +(\S+)", printed, re.MULTILINE)[-1])
         print(
@@ -190,7 +190,7 @@ def calculix(model: BendingModel, pressure: float) -> Outcome:
     with tempfile.TemporaryDirectory() as folder:
         write_deck(Path(folder) / "bellow.inp", model, pressure=pressure, increments=INCREMENTS)
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        run = _run("bellow", folder)
+        ended = run("bellow", folder)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         printed = (Path(folder) / "bellow.dat").read_text(encoding="ascii")
     turns = {
@@ -200,12 +200,13 @@ def calculix(model: BendingModel, pressure: float) -> Outcome:
     wanted = [1 + i / INCREMENTS for i in range(INCREMENTS + 1)]
     found = [next((a for t, a in turns.items() if abs(t - at) < 1e-6), None) for at in wanted]
     if None in found:
-        raise RuntimeError(f"CalculiX did not get there:\n{run.stdout[-2000:]}")
+        raise RuntimeError(f"CalculiX did not get there:\n{ended.stdout[-2000:]}")
     seconds = (after.ru_utime + after.ru_stime) - (before.ru_utime + before.ru_stime)
     return Outcome(tuple(float(np.degrees(a)) for a in found), seconds)
 
 
-def _run(name: str, folder: str) -> subprocess.CompletedProcess[str]:
+def run(name: str, folder: str) -> subprocess.CompletedProcess[str]:
+    """CalculiX on the deck `name` in a folder, on one thread."""
     return subprocess.run(
         ["ccx", name],
         cwd=folder,

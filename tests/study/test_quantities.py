@@ -64,13 +64,26 @@ def test_the_workspace_is_between_rest_and_the_pressure() -> None:
     assert one.value("tip_travel", 5e3) == pytest.approx(1e3 * expected)
 
 
+def test_the_inner_side_bends_to_an_arc_of_its_own_length() -> None:
+    angle = asked().value("angle", 5e3)
+    assert asked().value("inner_radius", 5e3) == pytest.approx(66 / np.radians(angle))
+
+
+def test_what_is_straight_has_an_infinite_radius() -> None:
+    one = asked("beam", 0.0)
+    assert one.value("angle", 0.0) == 0.0
+    assert one.value("inner_radius", 0.0) == np.inf
+
+
 def test_shapes_are_told_without_a_calculation(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(quantities, "predict", None)
     assert asked("shape").value("outer_diameter", 0.0) == pytest.approx(2 * (10 + 1.5))
     assert asked("shape").value("groove_width", 0.0) == pytest.approx(2 * (66 / 24 - 1.5))
 
 
-@pytest.mark.parametrize("quantity", ["angle_range", "tip_travel", "outer_diameter"])
+@pytest.mark.parametrize(
+    "quantity", ["angle_range", "inner_radius", "tip_travel", "outer_diameter"]
+)
 def test_other_families_have_no_such_quantity(quantity: quantities.QuantityName) -> None:
     linear = LIBRARY.actuator("bellow-axisymmetric")
     one = Asked(linear, LIBRARY.material("dragon-skin-30"), "beam", [5e3], Job())
