@@ -22,6 +22,7 @@ from rig.mechanics.fe import (
 )
 from rig.mechanics.fe.contact import Contact, Sampling, settle
 from rig.mechanics.fe.obstacles import Cylinder, Obstacle, Plane, Sphere
+from rig.mechanics.fe.onset import rounded
 from rig.mechanics.hyperelastic import NeoHookean, QuadraticVolume
 
 SIDE = 1e-2
@@ -116,9 +117,11 @@ def test_normal_and_curvature_are_the_derivatives_of_the_gap(name):
 # --- tangents ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.02, 5.0])
+@pytest.mark.parametrize(
+    ("friction", "softness"), [(0, 0), (0.02, 0), (5, 0), (0, 0.1), (0.02, 0.1)]
+)
 @pytest.mark.parametrize("name", OBSTACLES)
-def test_the_derivative_of_contact_is_that_of_its_forces(name, friction):
+def test_the_derivative_of_contact_is_that_of_its_forces(name, friction, softness):
     mesh = skfem.MeshHex().refined(1)
     d = discretise(mesh)
     under = mesh.facets_satisfying(lambda y: y[2] < 1e-9)
@@ -128,6 +131,7 @@ def test_the_derivative_of_contact_is_that_of_its_forces(name, friction):
         penalty=3.0,
         friction=friction,
         tolerance=1e-9,
+        softness=softness,
     )
     rng = np.random.default_rng(5)
     x = 0.1 * rng.standard_normal(d.size)
@@ -150,6 +154,18 @@ def test_the_derivative_of_contact_is_that_of_its_forces(name, friction):
     assert contact.symmetric == (friction == 0.0)
     if not friction:
         assert symmetric
+
+
+def test_an_onset_rounded_off_meets_both_sides_without_a_kink():
+    depth = np.linspace(-3.0, 3.0, 601)
+    counted, slope = rounded(depth, 1.0)
+    assert np.all(counted[depth <= -1] == 0)
+    np.testing.assert_allclose(counted[depth >= 1], depth[depth >= 1], rtol=1e-12)
+    np.testing.assert_allclose(np.gradient(counted, depth)[1:-1], slope[1:-1], atol=3e-3)
+    assert np.abs(np.diff(slope)).max() < 6e-3
+    sudden, step = rounded(depth, 0.0)
+    np.testing.assert_array_equal(sudden, np.maximum(depth, 0.0))
+    np.testing.assert_array_equal(step, depth >= 0)
 
 
 # --- patch, equilibrium, convergence ----------------------------------------------------------

@@ -30,6 +30,7 @@ from rig.mechanics.fe.linear import LinearSolver
 from rig.mechanics.fe.model import Item, Model
 from rig.mechanics.fe.newton import Options
 from rig.mechanics.fe.obstacles import Obstacle
+from rig.mechanics.fe.onset import rounded
 from rig.mechanics.fe.path import Point, Result, follow
 from rig.mechanics.fe.state import State
 
@@ -137,17 +138,20 @@ class Contact:
         penalty: float,
         friction: float = 0.0,
         tolerance: float,
+        softness: float = 0.0,
     ) -> None:
         """`penalty` in Pa/m (N/m for nodes), about Young's modulus over an element's size.
 
         `friction` is Coulomb's coefficient. Points may sink in, and sticking ones creep, by
-        `tolerance` in m: multipliers are updated until they do not.
+        `tolerance` in m: multipliers are updated until they do not. `softness` in m rounds off the
+        onset of contact, for surfaces that touch all over at once.
         """
         self.sampling = sampling
         self.obstacle = obstacle
         self.penalty = penalty
         self.friction = friction
         self.tolerance = tolerance
+        self.softness = softness
         self.dofs = sampling.dofs
         self.symmetric = friction == 0.0
         self.touches: list[Touch] = []
@@ -223,12 +227,11 @@ class Contact:
         """Tractions on the model (n, dim) in Pa, their derivatives by place; where it sticks."""
         places = self._places(x)
         gap, n, curvature = self.obstacle.distance(places)
-        pushed = self._pushed - self.penalty * gap
-        on = pushed >= 0
-        pushed = np.where(on, pushed, 0.0)
+        depth, inside = rounded(self._pushed / self.penalty - gap, self.softness)
+        pushed, on = self.penalty * depth, inside > 0
         outer = n[:, :, None] * n[:, None, :]
         traction = pushed[:, None] * n
-        slope = pushed[:, None, None] * curvature - self.penalty * on[:, None, None] * outer
+        slope = pushed[:, None, None] * curvature - self.penalty * inside[:, None, None] * outer
         if not self.friction:
             return traction, slope, np.zeros(len(gap), dtype=bool)
         wanted = self._dragged - self.penalty * (places - self._before)
@@ -247,7 +250,7 @@ class Contact:
         share = np.where(sticks, 1.0, limit / np.where(size > 0, size, 1.0))
         across = np.eye(places.shape[1]) - way[:, :, None] * way[:, None, :]
         cut = share[:, None, None] * np.einsum("nij,njk->nik", across, trial_slope)
-        cut += (-self.friction * self.penalty * on)[:, None, None] * (
+        cut += (-self.friction * self.penalty * inside)[:, None, None] * (
             way[:, :, None] * n[:, None, :]
         )
         traction = traction + np.where(on, share, 0.0)[:, None] * trial

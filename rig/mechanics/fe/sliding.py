@@ -34,6 +34,7 @@ from numpy.typing import NDArray
 from rig.mechanics.fe.discretisation import Discretisation, Integers, node_dofs
 from rig.mechanics.fe.errors import MeshError
 from rig.mechanics.fe.facets import Facets
+from rig.mechanics.fe.onset import rounded
 
 Array = NDArray[np.float64]
 
@@ -284,8 +285,7 @@ class Sliding:
         offset = np.einsum("nki,ni->nk", dual, away)
         gap = np.einsum("ni,ni->n", normal, away)
         slope = along(normal, difference) - np.einsum("nk,nkm->nm", offset, bend)
-        inside = np.clip((self._softness - gap) / (2 * self._softness), 0.0, 1.0)
-        depth = np.where(inside < 1, self._softness * inside**2, -gap)
+        depth, inside = rounded(-gap, self._softness)
         stiffness = self.penalty * known.hold * inside
         pressure = self.penalty * known.hold * depth
         drag, stick = self._friction(known, tangents, metric, inverse, away)

@@ -30,8 +30,10 @@ Array = NDArray[np.float64]
 
 _PENALTY = 1.0
 """Of Young's modulus over the bellow's height: under 50 kPa the tube sinks in by 0.1 mm, a
-thousandth of a radius of 3 inches. The whole arm lies down nearly at once; on a harder tube Newton
-chatters."""
+thousandth of a radius of 3 inches. On a harder tube Newton chatters."""
+_SOFTNESS = 2e-4
+"""Over which contact sets in, metres: the whole arm comes to lie on the tube nearly at once, and a
+sudden onset makes Newton chatter from there on."""
 _TOLERANCE = 1e-5
 
 
@@ -86,6 +88,7 @@ def wrap(
                 Cylinder((0.0, 0.0, axis), (0.0, 1.0, 0.0), cylinder_radius),
                 penalty=penalty,
                 tolerance=_TOLERANCE,
+                softness=_SOFTNESS,
             )
         )
         return (contacts[0],)
