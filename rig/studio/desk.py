@@ -27,8 +27,6 @@ from rig.experiment.request import make_request, require_measured_calibrations
 from rig.experiment.run import new_run
 from rig.experiment.setup import RunRequest
 from rig.link.client import RigLink
-from rig.mechanics.job import Job
-from rig.mechanics.store import FolderStore
 from rig.record.documents import PartDocument, PointDocument, PointKey
 from rig.spec.free_path import first_free
 from rig.spec.measurand import MEASURANDS, Measurand
@@ -38,6 +36,7 @@ from rig.studio.look import NOTHING, Look, Lookout
 from rig.studio.scope import Scope
 from rig.studio.seat import PATIENCE_S, Seat
 from rig.studio.watched import Glances, Pace, WatchedBench
+from rig.studio.works import job_of
 
 Ask = Literal["take", "give", "connect", "disconnect", "order", "answer"]
 Opcode = Literal["home", "zero_pressure", "tare", "jog", "set_pressure", "hold", "clear_fault"]
@@ -273,13 +272,17 @@ class Desk:
         bench: Bench
         if setup.bench.simulated:
             truth = None if folder is None else truth_path(folder, 0)
-            job = Job(FolderStore.of_user(), lambda _what, _progress: not self._leave.is_set())
-            bench = VirtualBench(setup, choice.seed, truth, job=job)
+            bench = VirtualBench(setup, choice.seed, truth, job=job_of(self._compute))
             pace, glances = Pace(choice.speed), self._glances()
         else:
             bench = RealBench(setup.bench, setup.calibrations.camera, self._ask)
             pace, glances = Pace(0.0), None
         return WatchedBench(bench, self.scope.seen, self._shown, pace, glances)
+
+    def _compute(self, progress: str) -> bool:
+        """Say how far the specimen is; it is given up when the bench is let go of."""
+        self._say(doing=f"opening the bench: {progress}")
+        return not self._leave.is_set()
 
     def _glances(self) -> Glances:
         return Glances(CAMERA_PERIOD_S, lambda: self.watchers > 0)

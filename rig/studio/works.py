@@ -53,7 +53,7 @@ def finite_elements(
     from rig.report.page import render_strength
     from rig.report.strength import strength_section
 
-    job = _job(tell)
+    job = job_of(tell)
     grid = np.linspace(0.0, pressure, CURVE_POINTS)
     response = predict(actuator, material, FINITE_ELEMENTS, grid, job)
     tell("stresses, strains and the 3D view")
@@ -129,7 +129,7 @@ def comparison(tell: Tell, folders: tuple[Path, ...]) -> str:
     """HTML of the page that lays runs beside each other; raises ReportError and RecordError."""
     from rig.report.compare import read_runs, write_comparison
 
-    runs = read_runs(folders, _job(tell))
+    runs = read_runs(folders, job_of(tell))
     with tempfile.TemporaryDirectory() as place:
         page = Path(place) / "comparison.html"
         write_comparison(page, runs)
@@ -140,10 +140,12 @@ def report(tell: Tell, folder: Path) -> None:
     """Write the report of a run anew; raises RecordError, SpecError and ReportError."""
     from rig.report.build import build_report
 
-    build_report(folder, job=_job(tell))
+    build_report(folder, job=job_of(tell))
 
 
-def _job(tell: Tell) -> Job:
+def job_of(tell: Tell) -> Job:
+    """Finite elements that say how far they are, and stop when `tell` answers False."""
+
     def watch(what: str, progress: Progress) -> bool:
         return tell(
             f"finite elements, {what}: {progress.pressure / 1e3:.2f} kPa, "

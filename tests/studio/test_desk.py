@@ -21,6 +21,9 @@ from rig.experiment.errors import ExperimentError, LimitError
 from rig.experiment.request import make_request
 from rig.experiment.run import new_run
 from rig.link.client import RigLink
+from rig.mechanics.errors import MechanicsError
+from rig.mechanics.fe import Progress
+from rig.mechanics.job import Job
 from rig.record.reader import RunReader
 from rig.studio.desk import LOST, Choice, Desk, _Take
 from rig.studio.errors import StudioError
@@ -173,6 +176,30 @@ def test_who_watches_moves_nothing(desk: Desk) -> None:
     ):
         with pytest.raises(StudioError, match="take control first"):
             asked()
+
+
+def test_a_specimen_that_is_computed_tells_how_far_it_is_until_the_bench_is_let_go_of(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[bool] = []
+
+    def computed(*_arguments: object, job: Job) -> Bench:
+        assert job.watch is not None
+        progress = Progress(2, 25, fraction=0.5, pressure=1500.0, converged=True, solves=3)
+        while job.watch("tip free", progress):
+            told.append(True)
+            time.sleep(0.01)
+        raise MechanicsError("stopped")
+
+    monkeypatch.setattr("rig.studio.desk.VirtualBench", computed)
+    desk.take_control("me")
+    desk.connect("me", BEAM)
+    until(lambda: bool(told))
+    assert desk.activity.doing == (
+        "opening the bench: finite elements, tip free: 1.50 kPa, 3 of 25 points"
+    )
+    desk.disconnect("me")
+    assert not desk.is_open
 
 
 def test_a_set_point_beyond_a_limit_never_reaches_the_board(desk: Desk) -> None:
