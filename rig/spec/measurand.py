@@ -20,9 +20,11 @@ class Measurand:
     unit: DeformationUnit
     per_si: float
     """Units per rad or metre."""
+    decimals: int
+    """That are worth showing while somebody watches."""
 
 
 MEASURANDS: dict[Deformation, Measurand] = {
-    "bending": Measurand("bending angle", "deg", 180 / math.pi),
-    "elongation": Measurand("elongation", "mm", 1e3),
+    "bending": Measurand("bending angle", "deg", 180 / math.pi, 1),
+    "elongation": Measurand("elongation", "mm", 1e3, 2),
 }

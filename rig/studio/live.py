@@ -101,6 +101,7 @@ def message(desk: Desk, session: str, watch: bool, number: int) -> tuple[str, in
         "no_deformation": look.reason,
         "quantity": desk.measurand.quantity,
         "unit": desk.measurand.unit,
+        "decimals": desk.measurand.decimals,
         "doing": activity.doing,
         "done": activity.done,
         "total": activity.total,

@@ -70,8 +70,8 @@ class Moment:
         if self.force_g is not None:
             said.append(f"{self.force_g:z.2f} g")
         if self.deformation is not None:
-            quantity, unit = self.measurand.quantity, self.measurand.unit
-            said.append(f"last {quantity} {self.deformation:z.1f} {unit}")
+            what = self.measurand
+            said.append(f"last {what.quantity} {self.deformation:z.{what.decimals}f} {what.unit}")
         if self.frame_s is not None:
             said.append(f"picture of {self.frame_s:.1f} s")
         return ", ".join((*said, self.doing) if self.doing else said)

@@ -56,7 +56,7 @@ function showBench(news) {
   tell("flags", news.connected ? news.flags : "");
   tell("force", fixed(news.force, 2));
   const known = news.connected && news.deformation !== null;
-  tell("deformation", known ? `${fixed(news.deformation, 1)} ${news.unit}` : "-");
+  tell("deformation", known ? `${fixed(news.deformation, news.decimals)} ${news.unit}` : "-");
   tellIfAny("fault", fault);
   tellIfAny("said", news.said);
   tellIfAny("question", news.question ? `${news.question}, then press "Done as asked".` : "");
