@@ -35,7 +35,8 @@ MESHES = (
 )
 PRESSURES = (5e3, 50e3, 100e3, 200e3)
 ARMS, TUBE = 3, 0.0762
-GRASP = (15e3, 30e3, 45e3, 60e3)
+GRASP = tuple(1e3 * p for p in (13, 26, 26.5, 26.75, 27, 27.25, 27.5, 28, 29, 30, 35, 40, 45))
+"""Close together where the tip arrives at the tube."""
 GAPS = (2e-3,)
 ARM_MESH = RowResolution(5e-3, 7e-3, 2)
 """The specimen's: 4 % stiff at 50 kPa."""

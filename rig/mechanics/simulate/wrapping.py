@@ -10,7 +10,7 @@ yield and has no friction. Arms do not touch each other: one stands for all.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,13 +28,16 @@ from rig.spec.material import MaterialSpec
 
 Array = NDArray[np.float64]
 
-_PENALTY = 1.0
-"""Of Young's modulus over the bellow's height: under 50 kPa the tube sinks in by 0.1 mm, a
-thousandth of a radius of 3 inches. On a harder tube Newton chatters."""
-_SOFTNESS = 2e-4
-"""Over which contact sets in, metres: the whole arm comes to lie on the tube nearly at once, and a
-sudden onset makes Newton chatter from there on."""
+_PENALTY = 0.1
+"""Of Young's modulus over the bellow's height. An arm touches with its tip and a few kPa: the tube
+sinks in by less than the softness. On a harder tube Newton chatters when the tip arrives."""
+_SOFTNESS = 5e-4
+"""Over which contact sets in, metres, of a radius of 76 mm: without it each pressure moves the tip
+further than it may sink in, 11 mm/kPa of an arm of 24 bellows."""
 _TOLERANCE = 1e-5
+
+_OPTIONS = replace(FREE_OPTIONS, iterations=20, alternate=False)
+"""Steps on which the tip arrives take many iterations; plain ones do not get there."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +97,7 @@ def wrap(
         return (contacts[0],)
 
     bending = rectangular_bellow_model(geometry, material, resolution=resolution, items=tube)
-    result = follow(bending.model, [Point(p) for p in (0.0, *pressures)], options=FREE_OPTIONS)
+    result = follow(bending.model, [Point(p) for p in (0.0, *pressures)], options=_OPTIONS)
     rest, *found = result.solutions
     area = float(contacts[0].sampling.weights.sum())
     touches = [contacts[0].touch(s.state.x) for s in found]
