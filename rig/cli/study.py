@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -60,7 +61,7 @@ def study(
 
     from rig.cli._interruption import catching_signals
     from rig.spec.workspace import Workspace
-    from rig.study.analysis import analyse
+    from rig.study.analysis import analyse, units_of
     from rig.study.plan import make_plan
     from rig.study.results import Folder
     from rig.study.run import run_study
@@ -84,7 +85,7 @@ def study(
         raise KeyboardInterrupt
     analysis = analyse(finished)
     if plots:
-        _draw(folder.path, analysis)
+        _draw(folder.path, analysis, units_of(finished.plan))
     if as_json:
         typer.echo(_as_json(finished, analysis))
     else:
@@ -140,15 +141,15 @@ def _points(plan: Plan) -> Table:
     return table
 
 
-def _draw(folder: Path, analysis: Analysis) -> None:
+def _draw(folder: Path, analysis: Analysis, units: Mapping[str, str]) -> None:
     from rig.study.factors import coded
     from rig.study.plots import plot_residuals, plot_surface
 
     for name, surface in analysis.surfaces.items():
-        plot_residuals(folder / f"{name}-residuals.png", surface)
+        plot_residuals(folder / f"{name}-residuals.png", surface, units)
         if len(surface.factors) > 1:
             points = coded(surface.factors, analysis.points)
-            plot_surface(folder / f"{name}-surface.png", surface, points)
+            plot_surface(folder / f"{name}-surface.png", surface, points, units)
 
 
 def _show(console: Console, finished: Study, analysis: Analysis) -> None:

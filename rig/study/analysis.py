@@ -21,8 +21,11 @@ from rig.study.factors import (
 )
 from rig.study.optimum import Goal, Limit, Optimum, StationaryPoint, optimum, stationary_point
 from rig.study.plan import Plan, Point
+from rig.study.quantities import UNITS
 from rig.study.run import Study
 from rig.study.surface import Surface, fit_surface
+
+_WRITTEN = {"kpa": "kPa", "ml": "mL", "percent": "%", "1": ""}
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,13 @@ class Analysis:
     limited: tuple[str, ...]
     """Responses with limits, in the order of `best.limited`."""
     remarks: tuple[str, ...]
+
+
+def units_of(plan: Plan) -> dict[str, str]:
+    """Units of factors and responses by name, as people write them; empty for a pure number."""
+    factors = {name: field.lab_unit for name, field in plan.fields.items()}
+    asked = {one.name: UNITS[one.quantity] for one in plan.spec.responses}
+    return {name: _WRITTEN.get(unit, unit) for name, unit in (factors | asked).items()}
 
 
 def analyse(study: Study) -> Analysis:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rig.study import plots
 from rig.study.errors import StudyError
 from rig.study.factors import (
     Factor,
@@ -271,12 +272,29 @@ def test_actual_coefficients_are_the_same_surface() -> None:
     assert by_actual == pytest.approx(surface.diagnostics.fitted, rel=1e-9)
 
 
+def test_axes_carry_the_units_of_factors_and_response(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    figures = []
+    monkeypatch.setattr(plots, "save", lambda figure, path: figures.append(figure))
+    points, values = some_runs(0)
+    surface = fit_surface("y", FACTORS, points, values)
+    names = [factor.name for factor in FACTORS]
+    units = dict.fromkeys(names, "mm") | {"y": "kPa"}
+    plot_surface(tmp_path / "s.png", surface, coded(FACTORS, points), units)
+    plot_residuals(tmp_path / "r.svg", surface, units)
+    flat, solid = figures[0].axes[0], figures[0].axes[1]
+    assert (flat.get_xlabel(), flat.get_ylabel()) == (f"{names[0]} (mm)", f"{names[1]} (mm)")
+    assert solid.get_zlabel() == "y (kPa)"
+    assert figures[1].axes[0].get_ylabel() == "residual (kPa)"
+
+
 def test_pictures_are_written(tmp_path: Path) -> None:
     points, values = some_runs(0)
     surface = fit_surface("y", FACTORS, points, values)
-    plot_surface(tmp_path / "s.png", surface, coded(FACTORS, points))
-    plot_residuals(tmp_path / "r.svg", surface)
+    plot_surface(tmp_path / "s.png", surface, coded(FACTORS, points), {})
+    plot_residuals(tmp_path / "r.svg", surface, {})
     assert (tmp_path / "s.png").read_bytes().startswith(b"\x89PNG")
     assert "<svg" in (tmp_path / "r.svg").read_text()
     with pytest.raises(StudyError, match="cannot be written"):
-        plot_residuals(tmp_path / "none" / "r.svg", surface)
+        plot_residuals(tmp_path / "none" / "r.svg", surface, {})
