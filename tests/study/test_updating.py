@@ -38,7 +38,7 @@ def specimen(seed: int) -> Specimen:
 def measured(one: Specimen, seed: int, pressure: np.ndarray = LEVELS) -> Measured:
     """Levels with normal noise of the stated uncertainties."""
     rng = np.random.default_rng(100 + seed)
-    angle = np.interp(pressure, one.pressure, one.angle)
+    angle = np.interp(pressure, one.pressure, one.deformation)
     force = np.interp(pressure[1:], one.pressure, one.blocked_force)
     return Measured(
         pressure,
