@@ -19,14 +19,13 @@ from rig.vision.displacement import DisplacementMeasurement, DisplacementMeter
 from rig.vision.errors import UntrustedFrameError
 from rig.vision.measure import AngleMeasurement, AngleMeter
 from rig.vision.overlay import COVERAGE_FACTOR, draw_displacement, draw_overlay, draw_rejected
-from rig.vision.segment import Image, decoded
+from rig.vision.segment import UNREADABLE, Image, decoded
 
 FLAG_PLANE_U_MM = 1.0
 """Standard uncertainty of how far before or behind the ruler's plane the markers are: glued to
 parts that hang in that plane."""
 MAX_U_MM = 1.0
 """Standard uncertainty from which an elongation is no measurement."""
-UNREADABLE = "the frame is no readable picture"
 
 
 @dataclass(frozen=True)

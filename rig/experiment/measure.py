@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from rig.experiment.bench import Camera
-from rig.experiment.deformation import UNREADABLE, DeformationMeter, Sight, rejected
+from rig.experiment.deformation import DeformationMeter, Sight, rejected
 from rig.experiment.errors import ExperimentError
 from rig.experiment.evaluate import budget_lines, deformation_point, force_point
 from rig.experiment.plan import MEASURE_S
@@ -16,7 +16,7 @@ from rig.link.schema import Schema
 from rig.record.documents import DeformationReading, PointDocument, PointKey
 from rig.record.writer import RunWriter
 from rig.spec.calibration import LoadCellCalibration
-from rig.vision.segment import decoded
+from rig.vision.segment import UNREADABLE, decoded
 
 RETRY_FACTOR = 2
 """At most this many times the wanted readings are taken to make up for rejected ones."""

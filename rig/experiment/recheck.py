@@ -11,7 +11,7 @@ import numpy as np
 from rig.experiment.bench import Camera
 from rig.experiment.errors import ExperimentError
 from rig.vision.measure import AngleMeter
-from rig.vision.segment import decoded
+from rig.vision.segment import UNREADABLE, decoded
 
 LOOKS = 3
 MAX_RESIDUAL_PX = 0.15
@@ -29,7 +29,7 @@ def recheck_camera(camera: Camera, meter: AngleMeter) -> float:
     for _ in range(LOOKS):
         image = decoded(camera.grab()[1])
         if image is None:
-            reason = "the frame is no readable picture"
+            reason = UNREADABLE
             continue
         seen = meter.check_ruler(image)
         if seen.residual_px is None:

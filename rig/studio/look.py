@@ -11,7 +11,7 @@ import cv2
 from rig.experiment.deformation import DeformationMeter
 from rig.vision.errors import VisionError
 from rig.vision.overlay import COVERAGE_FACTOR
-from rig.vision.segment import decoded
+from rig.vision.segment import UNREADABLE, decoded
 
 JPEG_QUALITY = 80
 
@@ -38,7 +38,7 @@ def looked_at(jpeg: bytes, meter: DeformationMeter) -> Look:
     """Measure the picture; one that cannot be read or measured is given back as it came."""
     image = decoded(jpeg)
     if image is None:
-        return Look(jpeg, reason="the frame is no readable picture")
+        return Look(jpeg, reason=UNREADABLE)
     try:
         sight, drawn = meter.drawn(image)
     except VisionError as error:

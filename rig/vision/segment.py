@@ -60,6 +60,10 @@ def as_image(array: object) -> Image:
     return np.asarray(array, dtype=np.uint8)
 
 
+UNREADABLE = "the frame is no readable picture"
+"""What is said of one that `decoded` gives nothing for."""
+
+
 def decoded(coded: bytes) -> Image | None:
     """A coded picture, such as a camera's JPEG, as BGR; None where it is no readable one."""
     image = cv2.imdecode(np.frombuffer(coded, np.uint8), cv2.IMREAD_COLOR)

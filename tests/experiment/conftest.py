@@ -19,6 +19,7 @@ from rig.experiment.recorded import RunOutcome
 from rig.experiment.run import new_run, resume_run
 from rig.experiment.setup import RunRequest
 from rig.mechanics.outline import body_of
+from rig.plant.camera import CameraFault
 from rig.record.documents import PointDocument
 from rig.record.reader import RunReader
 from rig.spec.protocol import ProtocolSpec
@@ -96,6 +97,18 @@ class StopsAfter(Nobody):
     def check(self) -> None:
         if self._left <= 0:
             raise AbortedError("stopped on request.")
+
+
+class FailsAfter:
+    """The bench's camera, with a fault from a number of frames on."""
+
+    def __init__(self, bench: VirtualBench, frames: int, fault: CameraFault) -> None:
+        self._camera, self._left, self._fault = bench.camera, frames, fault
+
+    def grab(self) -> tuple[float, bytes]:
+        self._camera.fault = CameraFault.NONE if self._left > 0 else self._fault
+        self._left -= 1
+        return self._camera.grab()
 
 
 def take(

@@ -17,7 +17,15 @@ from rig.experiment.recheck import LOOKS
 from rig.experiment.replay import ReplayedRun
 from rig.plant.camera import CameraFault
 from rig.vision.segment import decoded
-from tests.experiment.conftest import ROOT, StopsAfter, VirtualRun, make_request, take, take_rest
+from tests.experiment.conftest import (
+    ROOT,
+    FailsAfter,
+    StopsAfter,
+    VirtualRun,
+    make_request,
+    take,
+    take_rest,
+)
 from tests.experiment.truth import errors
 
 ACTUATOR = "bellow-axisymmetric"
@@ -82,20 +90,10 @@ def test_a_resumed_run_counts_from_the_rest_of_its_beginning(tmp_path: Path) -> 
 
 
 def test_without_markers_at_rest_nothing_is_pressurised(tmp_path: Path) -> None:
-    class Hides:
-        """After the frames that check the calibration something is before the lower marker."""
-
-        def __init__(self, bench: VirtualBench) -> None:
-            self._camera, self._frames = bench.camera, 0
-
-        def grab(self) -> tuple[float, bytes]:
-            self._frames += 1
-            hidden = self._frames > LOOKS
-            self._camera.fault = CameraFault.OCCLUDED_CAP if hidden else CameraFault.NONE
-            return self._camera.grab()
-
     def hide(bench: VirtualBench) -> None:
-        bench.camera = Hides(bench)  # type: ignore[assignment]
+        """Something is before the lower marker after the frames that check the calibration."""
+        fault = CameraFault.OCCLUDED_CAP
+        bench.camera = FailsAfter(bench, LOOKS, fault)  # type: ignore[assignment]
 
     run = take(tmp_path / "run", request(), prepare=hide)
     assert run.outcome.stop.exit_status == "failed"

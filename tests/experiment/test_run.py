@@ -31,7 +31,7 @@ from rig.record.reader import RunReader
 from rig.record.writer import RunWriter
 from tests.evidence import Evidence
 
-from .conftest import ROOT, SHORT, StopsAfter, VirtualRun, make_request, take, take_rest
+from .conftest import ROOT, SHORT, FailsAfter, StopsAfter, VirtualRun, make_request, take, take_rest
 from .truth import errors
 
 ANGLE_TARGET_DEG = 0.2
@@ -187,19 +187,9 @@ def test_a_log_that_cannot_grow_does_not_keep_the_bench_from_venting(
 
 
 def test_a_dark_picture_ends_the_run_instead_of_a_point_without_a_value(tmp_path: Path) -> None:
-    class GoesDark:
-        """After the frames that check the calibration the light is off."""
-
-        def __init__(self, bench: VirtualBench) -> None:
-            self._camera, self._frames = bench.camera, 0
-
-        def grab(self) -> tuple[float, bytes]:
-            self._frames += 1
-            self._camera.fault = CameraFault.DARK if self._frames > LOOKS else CameraFault.NONE
-            return self._camera.grab()
-
     def darken(bench: VirtualBench) -> None:
-        bench.camera = GoesDark(bench)  # type: ignore[assignment]
+        """The light goes off after the frames that check the calibration."""
+        bench.camera = FailsAfter(bench, LOOKS, CameraFault.DARK)  # type: ignore[assignment]
 
     run = take(tmp_path / "run", make_request(), prepare=darken)
     assert run.outcome.stop.exit_status == "failed"

@@ -15,7 +15,7 @@ from rig.experiment.sweep import go_to
 from rig.link.client import Message, RigLink
 from rig.spec.workspace import Setup
 from rig.vision.measure import AngleMeter
-from rig.vision.segment import decoded
+from rig.vision.segment import UNREADABLE, decoded
 
 RATE = "setpoint_rate_kpa_s"
 SETTLING_CYCLES = 3
@@ -95,7 +95,7 @@ def _measured(
         if found is not None and found.accepted:
             seen.append((time_s + known_s, found.angle_deg))
         else:
-            reason = "the frame is no readable picture" if found is None else found.reason
+            reason = UNREADABLE if found is None else found.reason
     if len(seen) < LEAST_SHARE * len(frames):
         raise ExperimentError(
             f"only {len(seen)} of {len(frames)} frames of the swinging actuator can be trusted; "

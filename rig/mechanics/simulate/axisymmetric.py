@@ -85,9 +85,7 @@ def axisymmetric_model(
     energy.
     """
     shape = AxisymmetricBellow.of(geometry)
-    body = mesh_axisymmetric_bellow(shape, resolution or AxisymmetricResolution.level(1))
-    d = discretise(body.mesh, Kinematics.AXISYMMETRIC)
-    soft = Solid(d, *mixed_energies(material))
+    d, soft = soft_meridian(shape, material, resolution or AxisymmetricResolution.level(1))
     model = Model(
         d,
         [soft],
@@ -106,11 +104,17 @@ def pressed_model(
 ) -> PressedModel:
     """The model with a plate over its top; arguments and errors as in `axisymmetric_model`."""
     shape = AxisymmetricBellow.of(geometry)
-    body = mesh_axisymmetric_bellow(shape, resolution or AxisymmetricResolution.level(1))
-    d = discretise(body.mesh, Kinematics.AXISYMMETRIC)
-    soft = Solid(d, *mixed_energies(material))
+    d, soft = soft_meridian(shape, material, resolution or AxisymmetricResolution.level(1))
     contact = top_contact(d, Plane((0.0, shape.height), (0.0, -1.0)), geometry, material)
     return PressedModel(model_against(d, soft, contact), soft, material.density.value, contact)
+
+
+def soft_meridian(
+    shape: AxisymmetricBellow, material: MaterialSpec, resolution: AxisymmetricResolution
+) -> tuple[Discretisation, Solid]:
+    """The meshed meridian; raises MechanicsError for a material without a volumetric energy."""
+    d = discretise(mesh_axisymmetric_bellow(shape, resolution).mesh, Kinematics.AXISYMMETRIC)
+    return d, Solid(d, *mixed_energies(material))
 
 
 def top_contact(

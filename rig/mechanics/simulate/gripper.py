@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 from scipy.special import ellipe
 
 from rig.mechanics.fe import (
-    Kinematics,
     Model,
     PressureSurface,
     Solid,
@@ -38,13 +37,13 @@ from rig.mechanics.fe.obstacles import Cylinder, Obstacle, Plane, Sphere
 from rig.mechanics.mesh.bellow_axisymmetric import (
     AxisymmetricBellow,
     AxisymmetricResolution,
-    mesh_axisymmetric_bellow,
     mesh_bellow_quarter,
 )
 from rig.mechanics.simulate.axisymmetric import (
     AxisymmetricModel,
     axisymmetric_model,
     model_against,
+    soft_meridian,
     top_contact,
 )
 from rig.mechanics.simulate.energies import mixed_energies
@@ -129,11 +128,9 @@ def grip_model(
 def _whole(
     geometry: BellowGripperGeometry, material: MaterialSpec, resolution: AxisymmetricResolution
 ) -> GripModel:
-    body = mesh_axisymmetric_bellow(AxisymmetricBellow.of(geometry.finger), resolution)
-    d = discretise(body.mesh, Kinematics.AXISYMMETRIC)
+    d, soft = soft_meridian(AxisymmetricBellow.of(geometry.finger), material, resolution)
     contact = top_contact(d, _obstacle(geometry, dim=2), geometry.finger, material)
-    model = model_against(d, Solid(d, *mixed_energies(material)), contact)
-    return GripModel(model, contact, geometry.friction, share=1)
+    return GripModel(model_against(d, soft, contact), contact, geometry.friction, share=1)
 
 
 def _quarter(
